@@ -30,6 +30,7 @@ module gravier_time_stepper
   use gravier_cell_response, only: start_response
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest
+  use gravier_borne_impulses, only: take_back
   use gravier_waking, only: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
   use gravier_whole_problem, only: build_whole, take_whole
   use gravier_impulse_memory, only: keep_impulses, recall_impulses
@@ -202,7 +203,7 @@ contains
       if (allocated(error) .or. self%resting%bodies == 0 .or. figures%solve%status == solve_diverged) return
       finds_none = figures%solve%status /= solve_converged
       if (.not. finds_none) then
-        call wake_disturbed(self%decomposition, self%halo, self%problem, 2**(tries - 1), woken)
+        call wake_disturbed(self%decomposition, self%halo, self%physics, self%problem, 2**(tries - 1), woken)
         if (.not. woken) return
       end if
       if (finds_none .or. tries == most_tries) then
@@ -262,6 +263,7 @@ contains
       self%given = given_contacts_t()
     end if
     if (self%warm_start) call recall_impulses(self%halo, self%problem)
+    if (self%resting%bodies > 0) call take_back(self%problem, self%halo, self%decomposition)
     if (self%problem%cell%moves) call start_response(self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity

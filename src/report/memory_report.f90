@@ -123,8 +123,7 @@ contains
     call items(2)%add("shift", 4, merge(1, 0, simulation%decomposition%ni > 0))
     call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
     call items(2)%add("elongation", 8, simulation%halo%memory%n_spring)
-    call items(2)%add("reference", 8, simulation%halo%memory%n_reference)
-    call items(2)%add("watched", 4, merge(1, 0, simulation%halo%memory%n_reference > 0))
+    call items(2)%add("watched", 4, merge(1, 0, simulation%halo%memory%touch_row > 0))
     call items(2)%add("state", 4, simulation%halo%memory%n_states())
     call describe_body(simulation, held, items(3))
     items(4)%name = "grain seen, ghosts included"

@@ -98,7 +98,6 @@ contains
       call file%write_scalar("impulse_entries", int(memory%n_impulse, i8), error)
       call file%write_scalar("spring_entries", int(memory%n_spring, i8), error)
       call file%write_scalar("law_row", int(memory%law_row, i8), error)
-      call file%write_scalar("reference_entries", int(memory%n_reference, i8), error)
       call file%write_scalar("touch_row", int(memory%touch_row, i8), error)
       call file%write_scalar("may_sleep", int(simulation%decomposition%nr, i8), error)
       call file%write_scalar("key_row", int(memory%key_row, i8), error)

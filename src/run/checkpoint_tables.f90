@@ -6,7 +6,7 @@ module gravier_checkpoint_tables
   use gravier_periodic, only: period_words
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_narrow, only: narrow, take_count
-  use gravier_body_store, only: body_layout_t, place_word, rest_words
+  use gravier_body_store, only: body_layout_t, place_word
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_impulse_memory, only: list_impulses, match_impulses
@@ -171,7 +171,7 @@ contains
         & ": may_sleep: 0 or 1 was expected: the file is damaged")
       if (allocated(error)) may_sleep = layout%nr
       call file%read_table("grains", decomposition%n_subdomains, n_words + nd + 1 + &
-        & rest_words*(narrow(may_sleep) - layout%nr), records, counts, error)
+        & layout%rest_words()*(narrow(may_sleep) - layout%nr), records, counts, error)
       if (.not. allocated(error)) call fit_rest(narrow(may_sleep), layout, records)
       call file%read_scalar("largest_extent_when_listed", least_extent, error)
       call file%read_array("corner_of_orders", 3, 3, corner, error)
@@ -233,11 +233,11 @@ contains
 
     if (may_sleep == layout%nr) return
     ! the words of the rest are the last ones of a grain
-    before = layout%saved_words() - rest_words*layout%nr
-    more = size(records, 1) - before - rest_words*may_sleep
-    allocate (fitted(before + rest_words*layout%nr + more, size(records, 2)), source=0_i8)
+    before = layout%saved_words() - layout%rest_words()*layout%nr
+    more = size(records, 1) - before - layout%rest_words()*may_sleep
+    allocate (fitted(before + layout%rest_words()*layout%nr + more, size(records, 2)), source=0_i8)
     fitted(1:before, :) = records(1:before, :)
-    fitted(before + rest_words*layout%nr + 1:, :) = records(before + rest_words*may_sleep + 1:, :)
+    fitted(before + layout%rest_words()*layout%nr + 1:, :) = records(before + layout%rest_words()*may_sleep + 1:, :)
     call move_alloc(fitted, records)
   end subroutine fit_rest
 
@@ -284,20 +284,18 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:)
-    integer(i8) :: n_impulse, n_spring, law_row, n_reference, touch_row, key_row
+    integer(i8) :: n_impulse, n_spring, law_row, touch_row, key_row
     type(pair_memory_t) :: kept
     integer :: s, n
 
     call file%read_scalar("impulse_entries", n_impulse, error)
     call file%read_scalar("spring_entries", n_spring, error)
     call file%read_scalar("law_row", law_row, error)
-    call file%read_scalar("reference_entries", n_reference, error)
     call file%read_scalar("touch_row", touch_row, error)
     call file%read_scalar("key_row", key_row, error)
     call take_count(n_impulse, path//": impulse_entries", kept%n_impulse, error)
     call take_count(n_spring, path//": spring_entries", kept%n_spring, error)
     call take_count(law_row, path//": law_row", kept%law_row, error)
-    call take_count(n_reference, path//": reference_entries", kept%n_reference, error)
     call take_count(touch_row, path//": touch_row", kept%touch_row, error)
     call take_count(key_row, path//": key_row", kept%key_row, error)
     call file%read_table("impulses", simulation%decomposition%n_subdomains, 2 + kept%words(), records, counts, error)

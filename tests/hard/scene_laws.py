@@ -38,6 +38,7 @@ class Scene:
         self.tolerance = groups["solver"]["tolerance"]
         #: momentum over the root mean square of impulses below which a grain may be made to stand still
         self.sleep_speed = groups["solver"].get("sleep_speed", 100.0 * self.tolerance) if groups["solver"].get("sleeping") else 0.0
+        self.sleep_after = groups["solver"].get("sleep_after", 20)
         rotation = scene.get("rotation", True)
         self.rolls = rotation and any(max(self.coefficients[name]) > 0.0 for name in ("rolling_friction", "pivoting_friction"))
         self.turns = (self.with_friction(boundaries) or self.rolls) and rotation
@@ -133,9 +134,9 @@ class Contacts:
             return np.ones((self.n, 1, 1))
         return np.concatenate([self.normal[:, None], self.tangent], 1)
 
-    def share_beside(self, bodies):
-        """Share of the contacts that have one of these bodies, by a mask, at a side."""
-        return float((bodies[self.side[0]] | bodies[self.side[1]]).mean()) if self.n else 0.0
+    def beside(self, bodies):
+        """Which contacts have one of these bodies, by a mask, at a side."""
+        return bodies[self.side[0]] | bodies[self.side[1]]
 
     def relative(self, velocity):
         """(c, d), with moments (c, 3 d - 3): normal, tangential, then of the spins times R*, of the candidate against the
@@ -250,6 +251,33 @@ def check_numbers(run):
     return wrong
 
 
+class Sleepers:
+    """The momenta that grains which stand still may have by their impulses, l of theory.md, section 12: a grain that sleeps that of
+    the step in which it fell asleep, any other half of that of now."""
+    #: of the normal impulses on a grain
+    SHARE = 0.1
+
+    def __init__(self, scene):
+        self.speed, self.after = scene.sleep_speed, scene.sleep_after
+        #: by the identifiers of those that sleep; of those that slept before the first state nothing is known
+        self.known = {}
+
+    def limits(self, contacts, rest):
+        """Of all bodies (grains, walls), infinite where it is not known, by the steps at rest in the last state and in this one."""
+        grains = len(contacts.identifiers)
+        now = np.zeros(len(contacts.mass), bool)
+        now[:grains] = rest[1] >= self.after
+        slept = now.copy()
+        slept[:grains] &= rest[0] >= self.after
+        solved = contacts.all_impulses()[contacts.beside(~slept & contacts.free)]
+        usual = np.sqrt((solved ** 2).sum() / max(len(solved), 1))
+        pressing = sum(np.bincount(side, contacts.pressing, len(contacts.mass)) for side in contacts.side)
+        found = np.minimum(self.speed * usual, self.SHARE * pressing)
+        self.known = {i: self.known.get(i, np.inf) if slept[k] else found[k] for k, i in enumerate(contacts.identifiers) if now[k]}
+        return np.array([self.known.get(i, np.inf) if slept[k] else 0.5 * found[k] for k, i in enumerate(contacts.identifiers)] +
+                        [0.0] * len(contacts.walls))
+
+
 def check_states(run, scene, history):
     """Complaints about each pair of states that follow each other in the results of `run`; `history` has a row for each step that
     it kept."""
@@ -257,18 +285,24 @@ def check_states(run, scene, history):
     rows = {int(step): k for k, step in enumerate(history["step"])}
     wrong = []
     steps = steps_of(results)
+    sleepers = Sleepers(scene)
     for last, step in zip(steps, steps[1:]):
         contacts = Contacts(scene, results, step)
         if contacts.outside_cones():
             wrong.append(f"step {step}: an impulse is outside the cone of its law")
         if step != last + 1 or not np.array_equal(contacts.identifiers, results[f"/steps/{last}/bodies/id"]):
             continue
-        found = check_step(contacts, scene, results, (last, step), history["residual"][rows[step]])
+        limits = np.zeros(len(contacts.mass))
+        if scene.sleep_speed > 0.0:
+            limits = sleepers.limits(contacts, [results[f"/steps/{s}/bodies/rest"] for s in (last, step)])
+        found = check_step(contacts, scene, results, (last, step), (history["residual"][rows[step]], limits))
         wrong += [f"step {step}: {words}" for words in found]
     return wrong
 
 
-def check_step(contacts, scene, results, steps, residual):
+def check_step(contacts, scene, results, steps, bounds):
+    """Complaints about a step; `bounds`: the residual that was reported, and the momenta that grains which stand still may have."""
+    residual, limits = bounds
     old, new = (contacts.velocities(results, step) for step in steps)
     d = scene.dimension
     wrong = []
@@ -285,7 +319,7 @@ def check_step(contacts, scene, results, steps, residual):
             momenta = np.where(contacts.free, contacts.mass, 0.0) * (
                 np.linalg.norm(new[:, :d], axis=1) + contacts.radius * np.linalg.norm(new[:, d:], axis=1))
             usual = np.sqrt((contacts.all_impulses() ** 2).sum() / max(contacts.n, 1))
-            if np.any(momenta[standing] > (scene.sleep_speed + ROUNDING) * usual):
+            if np.any((momenta > limits + ROUNDING * usual)[standing]):
                 wrong.append("a grain stands still that moves by its impulses")
         off = np.abs(new - loaded - change)[contacts.free]
         size = (size + np.abs(loaded) + np.abs(old))[contacts.free]
@@ -309,7 +343,7 @@ def check_step(contacts, scene, results, steps, residual):
         missed, size = np.linalg.norm(defect), np.linalg.norm(contacts.all_impulses())
         rounding = ROUNDING * (mass * speed + size) * np.sqrt(contacts.n)
         # beside grains that stand still, by what these may move with
-        still = scene.sleep_speed * size * np.sqrt(contacts.share_beside(standing))
+        still = np.linalg.norm(sum(np.where(standing, limits, 0.0)[side] for side in contacts.side))
         if missed > 1.001 * residual * (size if size > 0.0 else mass * speed) + still + rounding:
             wrong.append(f"contacts miss their laws by {missed / size if size > 0.0 else missed:.1e}, reported was {residual:.1e}")
         slack = 2.0 * (missed + rounding) * (max(contacts.w_t.max(), contacts.w_r.max()) * size + np.linalg.norm(shifted) +

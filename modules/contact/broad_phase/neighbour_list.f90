@@ -11,9 +11,8 @@ module gravier_neighbour_list
     integer :: n_impulse = 0
     !> row of the states that laws with a memory give pairs, 0 for none
     integer :: law_row = 0
-    !> where bodies may sleep: entries of an impulse that is kept for them, and the row of a mark of pairs that touch while one sleeps;
-    !> 0 where none may
-    integer :: n_reference = 0, touch_row = 0
+    !> where bodies may sleep: the row of a mark of pairs whose contact is left out of the problem; 0 where none may
+    integer :: touch_row = 0
     !> where bodies have shapes or boundaries facets: the first of two rows of the key that tells a point of a pair from its others,
     !> 0 for no point
     integer :: key_row = 0
@@ -42,9 +41,6 @@ module gravier_neighbour_list
     real(dp), allocatable :: impulse(:, :)
     !> (entries of an elongation, n) [m]
     real(dp), allocatable :: spring(:, :)
-    !> where bodies may sleep, the impulse on the candidate when the first of two bodies fell asleep, along the global axes; 0 while
-    !> both are awake (nd, n) [N s]
-    real(dp), allocatable :: reference(:, :)
     !> where some body sleeps, the places of the pairs that are looked at, ascending: those with a grain that is awake (n_watched);
     !> not allocated where all are
     integer, allocatable :: watched(:)
@@ -76,7 +72,7 @@ contains
   !> Words of what is kept with a pair.
   pure integer function pair_memory_words(self) result(n)
     class(pair_memory_t), intent(in) :: self
-    n = self%n_impulse + self%n_spring + self%n_reference + self%n_states()
+    n = self%n_impulse + self%n_spring + self%n_states()
   end function pair_memory_words
 
   !> Whether pair `p` keeps something from the last step.
@@ -94,9 +90,6 @@ contains
     end do
     do e = 1, size(self%spring, 1)
       if (abs(self%spring(e, p)) > 0.0_dp) return
-    end do
-    do e = 1, size(self%reference, 1)
-      if (abs(self%reference(e, p)) > 0.0_dp) return
     end do
     keeps = .false.
   end function neighbour_list_keeps
@@ -127,7 +120,7 @@ contains
 
     self%n = 0
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
-    if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%reference, self%state)
+    if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%state)
     if (allocated(self%watched)) deallocate (self%watched)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
@@ -198,7 +191,6 @@ contains
     self%memory = memory
     allocate (self%impulse(memory%n_impulse, self%n), source=0.0_dp)
     allocate (self%spring(memory%n_spring, self%n), source=0.0_dp)
-    allocate (self%reference(memory%n_reference, self%n), source=0.0_dp)
     allocate (self%state(memory%n_states(), self%n), source=0)
   end subroutine neighbour_list_finish
 
@@ -222,7 +214,6 @@ contains
       if (size(self%shift) > 0) self%shift(n) = self%shift(p)
       self%impulse(:, n) = self%impulse(:, p)
       self%spring(:, n) = self%spring(:, p)
-      self%reference(:, n) = self%reference(:, p)
       self%state(:, n) = self%state(:, p)
     end do
     self%n = n

@@ -7,6 +7,7 @@ module gravier_layer_trial
   use gravier_method, only: method_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_layered_start, only: carry_loads
+  use gravier_fresh_start, only: begin_anew
   use gravier_vain_impulses, only: kept_impulses_t
   implicit none
   private
@@ -132,7 +133,8 @@ contains
     end if
     self%layered = .true.
     self%ends = iteration + trial
-    call begin_anew(self, problem, method, velocity, iteration, error)
+    call begin_anew(problem, method, velocity, iteration, error)
+    self%anew = .true.
   end subroutine try
 
   !> Go on from the pass where it has brought something, else from the impulses before it. Collective.
@@ -167,22 +169,8 @@ contains
     do s = 1, size(problem%sub)
       problem%sub(s)%impulse(:, :, :) = self%before(s)%value
     end do
-    call begin_anew(self, problem, method, velocity, iteration, error)
-  end subroutine go_back
-
-  !> The method starts anew from the impulses that the problem holds now. Collective.
-  subroutine begin_anew(self, problem, method, velocity, iteration, error)
-    type(layer_trial_t), intent(inout) :: self
-    type(contact_problem_t), intent(inout) :: problem
-    class(method_t), intent(inout) :: method
-    type(velocity_error_t), intent(inout) :: velocity
-    integer, intent(in) :: iteration
-    type(error_t), allocatable, intent(inout) :: error
-
-    call method%start(problem, error)
-    method%work%solves = method%work%solves - 1
-    call velocity%begin_anew(iteration)
+    call begin_anew(problem, method, velocity, iteration, error)
     self%anew = .true.
-  end subroutine begin_anew
+  end subroutine go_back
 
 end module gravier_layer_trial

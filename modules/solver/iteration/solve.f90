@@ -13,6 +13,7 @@ module gravier_solve
   use gravier_stagnation, only: stagnation_t
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
+  use gravier_fresh_start, only: fresh_start_t
   use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
   implicit none
   private
@@ -123,6 +124,7 @@ module gravier_solve
     type(check_schedule_t) :: schedule
     type(stagnation_t) :: stagnation
     type(layer_trial_t) :: trial
+    type(fresh_start_t) :: fresh
     !> the first defect, or the scale of forces where that is larger [N s]
     real(dp) :: reference = 0.0_dp
     !> when the solve began, and what its checks have taken [s]
@@ -155,6 +157,7 @@ contains
     if (allocated(error)) return
     call check(state, problem, method, control, report, done, exact)
     state%schedule%settled = state%by_estimate .and. report%residual <= control%tolerance
+    call state%fresh%init(problem, control%tolerance)
     if (state%by_estimate .and. control%layered) call state%trial%start(problem, report%residual, control%accuracy)
     do while (.not. done)
       report%iterations = report%iterations + 1
@@ -168,6 +171,8 @@ contains
         call check(state, problem, method, control, report, done, exact)
         if (done) exit
         call state%trial%advance(problem, method, state%velocity, report%iterations, anew, error)
+        if (allocated(error)) return
+        call state%fresh%renew(problem, method, state%velocity, report%iterations, anew, error)
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if

@@ -142,7 +142,7 @@ contains
     type(neighbour_list_t), intent(inout) :: list
     integer, allocatable :: source(:)
     logical, allocatable :: taken(:)
-    real(dp), allocatable :: impulse(:, :), spring(:, :), reference(:, :)
+    real(dp), allocatable :: impulse(:, :), spring(:, :)
     integer, allocatable :: state(:, :)
     integer :: k, l, m, row
 
@@ -152,7 +152,6 @@ contains
     if (are_the_same()) return
     impulse = list%impulse(:, p:p + m - 1)
     spring = list%spring(:, p:p + m - 1)
-    reference = list%reference(:, p:p + m - 1)
     state = list%state(:, p:p + m - 1)
     allocate (source(points%n), source=0)
     allocate (taken(m), source=.false.)
@@ -176,20 +175,14 @@ contains
     end do
     list%impulse(:, p:p + m - 1) = 0.0_dp
     list%spring(:, p:p + m - 1) = 0.0_dp
-    list%reference(:, p:p + m - 1) = 0.0_dp
     list%state(:, p:p + m - 1) = 0
     do k = 1, points%n
       if (source(k) > 0) then
         list%impulse(:, p + k - 1) = impulse(:, source(k))
         list%spring(:, p + k - 1) = spring(:, source(k))
-        list%reference(:, p + k - 1) = reference(:, source(k))
         list%state(:, p + k - 1) = state(:, source(k))
       end if
       list%state(row:row + 1, p + k - 1) = points%key(:, k)
-    end do
-    ! what bodies that sleep expect of the pair is not less for a point that is gone
-    do l = 1, merge(m, 0, list%memory%n_reference > 0)
-      if (.not. any(source == l)) list%reference(:, p) = list%reference(:, p) + reference(:, l)
     end do
 
   contains

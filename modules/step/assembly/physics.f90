@@ -27,6 +27,7 @@ module gravier_physics
     type(cell_motion_t) :: cell
   contains
     procedure :: accelerate => physics_accelerate
+    procedure :: find_inverse_mass => physics_find_inverse_mass
   end type physics_t
 
 contains
@@ -54,5 +55,19 @@ contains
       v(d) = v(d) + self%h*self%body_force(d)*figures%volume_of(bodies, k)/bodies%mass(k)
     end do
   end subroutine physics_accelerate
+
+  !> The column of the inverse mass matrix of grain `k` (gravier_body_mass).
+  pure subroutine physics_find_inverse_mass(self, figures, bodies, k, inverse)
+    class(physics_t), intent(in) :: self
+    type(body_figures_t), intent(in) :: figures
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> (nw)
+    real(dp), intent(out), contiguous :: inverse(:)
+
+    inverse(1:bodies%nd) = 1.0_dp/bodies%mass(k)
+    inverse(bodies%nd + 1:) = 0.0_dp
+    if (size(inverse) > bodies%nd .and. self%rotation) call figures%find_inverse_inertia(bodies, k, inverse(bodies%nd + 1:))
+  end subroutine physics_find_inverse_mass
 
 end module gravier_physics

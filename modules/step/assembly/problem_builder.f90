@@ -170,11 +170,9 @@ contains
       associate (before => view%bodies%velocity(1:kernels%nd, k), after => sub%v_free(1:kernels%nd, b))
         sub%largest_term = max(sub%largest_term, view%bodies%mass(k)*max(norm2(before), norm2(after - before)))
       end associate
-      sub%inverse_mass(1:kernels%nd, b) = 1.0_dp/view%bodies%mass(k)
+      call physics%find_inverse_mass(figures, view%bodies, k, sub%inverse_mass(:, b))
       if (allocated(sub%volume)) sub%volume(b) = figures%volume_of(view%bodies, k)
       if (allocated(sub%applied)) sub%applied(:, b) = physics%h*view%bodies%force(:, k)/view%bodies%mass(k)
-      if (kernels%nw > kernels%nd .and. physics%rotation) call figures%find_inverse_inertia(view%bodies, k, &
-        & sub%inverse_mass(kernels%nd + 1:, b))
     end do
   end subroutine pack_grains
 

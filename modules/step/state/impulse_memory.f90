@@ -14,7 +14,7 @@ module gravier_impulse_memory
   public :: memory_of, impulse_entries, keep_impulses, recall_impulses, list_impulses, match_impulses, pair_record
 
   !> the words of a record of list_impulses, in their order: the version of checkpoints, which changes with them
-  character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation reference states"
+  character(len=*), parameter :: pair_record = "candidate antagonist impulse elongation states"
 
 contains
 
@@ -26,10 +26,7 @@ contains
 
     memory%n_impulse = merge(impulse_entries(kernels), 0, warm_start)
     memory%law_row = merge(1, 0, remembers)
-    if (may_sleep) then
-      memory%n_reference = kernels%nd
-      memory%touch_row = memory%law_row + 1
-    end if
+    if (may_sleep) memory%touch_row = memory%law_row + 1
     if (has_points) memory%key_row = memory%n_states() + 1
     if (kernels%row%compliance_t > 0) memory%n_spring = merge(1, 3, kernels%nd == 2)
   end function memory_of
@@ -110,8 +107,8 @@ contains
     end do
   end subroutine recall_impulses
 
-  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring, the reference of bodies that sleep and the
-  !> states, for pairs of a list; the antagonist of a boundary is minus its number.
+  !> Identifiers of candidate and antagonist, the impulse, the elongation of a spring and the states, for pairs of a list; the
+  !> antagonist of a boundary is minus its number.
   subroutine list_impulses(view, lead, pairs, records)
     type(local_bodies_t), intent(in) :: view
     !> words left free before those of a record
@@ -134,9 +131,6 @@ contains
         do e = 1, size(list%spring, 1)
           records(lead + 2 + size(list%impulse, 1) + e, n) = transfer(list%spring(e, p), 0_i8)
         end do
-        do e = 1, size(list%reference, 1)
-          records(lead + 2 + size(list%impulse, 1) + size(list%spring, 1) + e, n) = transfer(list%reference(e, p), 0_i8)
-        end do
         records(lead + 3 + list%memory%words() - list%memory%n_states():, n) = list%state(:, p)
       end do
     end associate
@@ -152,7 +146,7 @@ contains
 
   !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.
   subroutine match_impulses(records, kept, view)
-    !> (2 + words of `kept`, n): candidate, antagonist, impulse, elongation, reference, states
+    !> (2 + words of `kept`, n): candidate, antagonist, impulse, elongation, states
     integer(i8), intent(in), contiguous :: records(:, :)
     type(pair_memory_t), intent(in) :: kept
     type(local_bodies_t), intent(inout) :: view
@@ -176,9 +170,6 @@ contains
         end do
         do e = 1, min(list%memory%n_spring, kept%n_spring)
           list%spring(e, p) = transfer(records(2 + kept%n_impulse + e, k), 0.0_dp)
-        end do
-        do e = 1, min(list%memory%n_reference, kept%n_reference)
-          list%reference(e, p) = transfer(records(2 + kept%n_impulse + kept%n_spring + e, k), 0.0_dp)
         end do
         call take_state(list%memory%law_row, kept%law_row)
         call take_state(list%memory%touch_row, kept%touch_row)

@@ -125,7 +125,6 @@ contains
 
     to%impulse(:, p) = from%impulse(:, q)
     to%spring(:, p) = from%spring(:, q)
-    to%reference(:, p) = from%reference(:, q)
     to%state(:, p) = from%state(:, q)
   end subroutine copy_memory
 

@@ -9,9 +9,9 @@
 !> else add up, step by step. After `after` steps it sleeps.
 !>
 !> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
-!> grains that are awake stay: there the sleeper is a body that cannot move. The impulses that they had when it fell asleep are its
-!> reference. Where those of a solve differ from them, summed over the contacts of a sleeper, by more than the l/2 of that time, it
-!> wakes with those around it, and the step is solved anew. See doc/theory.md, section 12.
+!> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left
+!> out would together give it a momentum of more than the l of the step in which it fell asleep, it wakes with those around it, and
+!> the step is solved anew. See doc/theory.md, section 12.
 module gravier_sleeping
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -24,9 +24,10 @@ module gravier_sleeping
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_velocity_return, only: find_senders
+  use gravier_borne_impulses, only: contacts_t, find_seen, leave_out
   implicit none
   private
-  public :: sleeping_rule_t, count_rest, may_push
+  public :: sleeping_rule_t, count_rest, may_push, momentum_of
 
   !> momentum of a body at rest with what may change while it sleeps, and changes of the impulses on it in a step, over the normal
   !> impulses on it
@@ -39,7 +40,7 @@ module gravier_sleeping
     real(dp), allocatable :: sums(:, :), restless(:, :)
     !> whether each column is at rest (n_columns)
     logical, allocatable :: rests(:)
-    !> steps at rest, with this one (n_grains); place in the view (n_grains)
+    !> steps at rest, with this one (n_grains); places in the view (n_columns)
     integer, allocatable :: steps(:), seen(:)
   end type rest_t
 
@@ -58,8 +59,9 @@ contains
     may_push = boundary%is_moved() .or. boundary%is_driven()
   end function may_push
 
-  !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the change
-  !> that wakes them, and their contacts a reference. Grains that are in no contact start anew. Collective.
+  !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the
+  !> momentum that wakes them, and bear the contacts that are left out from now on. Grains that are in no contact start anew.
+  !> Collective.
   subroutine count_rest(rule, stops, halo, problem, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     !> grains may come to stand still: v_global of those at rest becomes zero
@@ -69,6 +71,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     type(decomposition_t), intent(inout) :: decomposition
     type(rest_t) :: rest(size(problem%sub))
+    type(contacts_t) :: leaving(size(problem%sub))
     integer :: s, b
 
     do s = 1, size(problem%sub)
@@ -92,13 +95,14 @@ contains
           own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
           if (stops .and. 2*own%steps(b) >= rule%after) sub%v_global(:, b) = 0.0_dp
         end do
-        call set_references(problem, s, rule%after, own%steps, view%list)
+        call find_leaving(sub, rule%after, own%steps, leaving(s)%are)
       end associate
     end do
     call bring_home(rule, problem, rest, decomposition)
+    call leave_out(problem, leaving, halo, decomposition)
   end subroutine count_rest
 
-  !> l/2 [N s]: the momentum that a body at rest may have, and the change of impulses that it does not wake from.
+  !> l/2 [N s]: the momentum that a body at rest may have.
   pure real(dp) function allowed(rule, impulse_scale, pressing)
     type(sleeping_rule_t), intent(in) :: rule
     !> root mean square of all impulses; normal impulses on the body [N s]
@@ -164,20 +168,16 @@ contains
     end associate
   end subroutine find_rest
 
-  !> Places in the view of the grains of a subdomain.
-  subroutine find_seen(list, sub, seen)
-    type(neighbour_list_t), intent(in) :: list
-    type(subproblem_t), intent(in) :: sub
-    !> (n_grains)
-    integer, allocatable, intent(out) :: seen(:)
-    integer :: c
-
-    allocate (seen(sub%n_grains), source=0)
-    do c = 1, sub%n_contacts
-      if (sub%pair(1, c) <= sub%n_grains) seen(sub%pair(1, c)) = list%candidate(sub%source(c))
-      if (sub%pair(2, c) <= sub%n_grains) seen(sub%pair(2, c)) = list%antagonist(sub%source(c))
-    end do
-  end subroutine find_seen
+  !> m (|v| + R |w|) of a velocity of a grain [N s].
+  pure real(dp) function momentum_of(v, nd, radius, inverse) result(momentum)
+    !> (nv)
+    real(dp), intent(in), contiguous :: v(:)
+    !> space dimension
+    integer, intent(in) :: nd
+    !> [m], [1/kg]
+    real(dp), intent(in) :: radius, inverse
+    momentum = (norm2(v(1:nd)) + radius*norm2(v(nd + 1:)))/inverse
+  end function momentum_of
 
   !> Whether the momentum of grain `b` is small, beside what acts on it.
   pure logical function is_slow(sub, nd, limit, b)
@@ -190,8 +190,7 @@ contains
     real(dp) :: momentum, reaction(nd)
     integer :: d
 
-    momentum = (norm2(sub%v_global(1:nd, b)) + sub%radius(b)*norm2(sub%v_global(nd + 1:, b))) &
-      & /inverse_of_translation(sub%inverse_mass(:, b), nd)
+    momentum = momentum_of(sub%v_global(:, b), nd, sub%radius(b), inverse_of_translation(sub%inverse_mass(:, b), nd))
     is_slow = limit > 0.0_dp .and. momentum <= limit
     if (.not. allocated(sub%attraction_load)) return
     do d = 1, nd
@@ -200,42 +199,27 @@ contains
     is_slow = is_slow .and. momentum <= share*norm2(reaction)
   end function is_slow
 
-  !> The contacts of grains that fall asleep are marked, and the impulses of now become the reference of those with grains that are
-  !> awake.
-  subroutine set_references(problem, s, after, steps, list)
-    type(contact_problem_t), intent(in) :: problem
-    integer, intent(in) :: s
+  !> Contacts all of whose grains sleep from now on.
+  pure subroutine find_leaving(sub, after, steps, leaving)
+    type(subproblem_t), intent(in) :: sub
     !> steps at rest after which a body sleeps; steps at rest (n_grains)
     integer, intent(in) :: after
     integer, intent(in), contiguous :: steps(:)
-    type(neighbour_list_t), intent(inout) :: list
-    real(dp) :: p(problem%kernels%nd)
-    integer :: c, k, b
-    logical :: starts, goes_on
+    !> (n_contacts)
+    logical, allocatable, intent(out) :: leaving(:)
+    integer :: c, k
 
-    if (.not. any(steps >= after)) return
-    associate (sub => problem%sub(s))
-      do c = 1, sub%n_contacts
-        starts = .false.
-        goes_on = .false.
-        do k = 1, 2
-          b = sub%pair(k, c)
-          if (b <= sub%n_grains) then
-            starts = starts .or. steps(b) >= after
-          else
-            goes_on = goes_on .or. sub%boundary(b) == 0
-          end if
-        end do
-        if (starts) list%state(list%memory%touch_row, sub%source(c)) = 1
-        if (goes_on .or. .not. starts) cycle
-        call problem%impulse_on_candidate(s, c, p)
-        list%reference(:, sub%source(c)) = p
+    allocate (leaving(sub%n_contacts), source=.true.)
+    do c = 1, sub%n_contacts
+      do k = 1, 2
+        ! the others sleep already, or are boundaries
+        if (sub%pair(k, c) <= sub%n_grains) leaving(c) = leaving(c) .and. steps(sub%pair(k, c)) >= after
       end do
-    end associate
-  end subroutine set_references
+    end do
+  end subroutine find_leaving
 
-  !> Bring steps at rest, and the changes that wake, to the owners of the grains, in this subdomain by their places, in others by
-  !> records (owner, grain, steps, change). Collective.
+  !> Bring steps at rest, and the momenta that wake, to the owners of the grains, in this subdomain by their places, in others by
+  !> records (owner, grain, steps, momentum). Collective.
   subroutine bring_home(rule, problem, rest, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     type(contact_problem_t), intent(in) :: problem
@@ -257,7 +241,7 @@ contains
         associate (sub => problem%sub(s))
           call find_senders(problem, s, sends)
           do b = 1, sub%n_grains
-            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), change_of(s, b))
+            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking_momentum(s, b))
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle
@@ -265,7 +249,7 @@ contains
             records(1, n) = sub%owner(b)
             records(2, n) = sub%id(b)
             records(3, n) = rest(s)%steps(b)
-            records(4, n) = transfer(change_of(s, b), 0_i8)
+            records(4, n) = transfer(waking_momentum(s, b), 0_i8)
           end do
         end associate
       end do
@@ -279,20 +263,20 @@ contains
 
   contains
 
-    !> The change that wakes grain `b` of subdomain `s` of this rank [N s].
-    pure real(dp) function change_of(s, b)
+    !> The momentum that wakes grain `b` of subdomain `s` of this rank, l [N s].
+    pure real(dp) function waking_momentum(s, b)
       integer, intent(in) :: s, b
-      change_of = allowed(rule, problem%impulse_scale, rest(s)%sums(1, b))
-    end function change_of
+      waking_momentum = 2.0_dp*allowed(rule, problem%impulse_scale, rest(s)%sums(1, b))
+    end function waking_momentum
 
     !> Set what is known of grain `place` of subdomain `h` of this rank.
-    subroutine put(h, place, steps, change)
+    subroutine put(h, place, steps, momentum)
       integer, intent(in) :: h, place, steps
       !> [N s]
-      real(dp), intent(in) :: change
+      real(dp), intent(in) :: momentum
 
       decomposition%owned(h)%rest(place) = steps
-      if (steps >= rule%after) decomposition%owned(h)%wakes_at(place) = change
+      if (steps >= rule%after) decomposition%owned(h)%wakes_at(place) = momentum
     end subroutine put
 
   end subroutine bring_home

@@ -1,5 +1,5 @@
-!> Which pairs are looked at while some bodies sleep, and what wakes these: a neighbour whose impulses change, a boundary that
-!> begins to move, a load that changes (gravier_sleeping has the rule).
+!> Which pairs are looked at while some bodies sleep, and what wakes these: impulses that would move them, a boundary that begins to
+!> move, a load that changes (gravier_sleeping has the rule).
 module gravier_waking
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange
@@ -8,8 +8,12 @@ module gravier_waking
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, find_staying
   use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_physics, only: physics_t
+  use gravier_body_store, only: body_set_t
+  use gravier_body_mass, only: add_inverse_mass
   use gravier_pair_laws, only: boundary_of
-  use gravier_sleeping, only: may_push
+  use gravier_borne_impulses, only: contacts_t, impulses_t, find_borne
+  use gravier_sleeping, only: may_push, momentum_of
   implicit none
   private
   public :: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
@@ -24,11 +28,6 @@ module gravier_waking
   type :: marks_t
     logical, allocatable :: of(:)
   end type marks_t
-
-  !> How much the impulses on each body have changed [N s].
-  type :: change_t
-    real(dp), allocatable :: of(:)
-  end type change_t
 
 contains
 
@@ -92,7 +91,6 @@ contains
     associate (list => view%list)
       if (allocated(list%watched)) deallocate (list%watched)
       if (.not. any(asleep)) then
-        list%reference(:, :) = 0.0_dp
         list%state(list%memory%touch_row, :) = 0
         return
       end if
@@ -103,10 +101,7 @@ contains
         sleeps_j = .false.
         if (list%antagonist(p) > 0) sleeps_j = asleep(list%antagonist(p))
         b = boundary_of(view, p)
-        if (.not. (sleeps_i .or. sleeps_j)) then
-          list%reference(:, p) = 0.0_dp
-          list%state(list%memory%touch_row, p) = 0
-        end if
+        if (.not. (sleeps_i .or. sleeps_j)) list%state(list%memory%touch_row, p) = 0
         if ((sleeps_i .and. sleeps_j) .or. ((sleeps_i .or. sleeps_j) .and. b > 0)) then
           view%n_resting = view%n_resting + list%state(list%memory%touch_row, p)
           if (b == 0) cycle
@@ -123,25 +118,27 @@ contains
     end associate
   end subroutine watch
 
-  !> Wake the bodies on which the impulses of a solve differ by much from those under which they fell asleep, and those around them.
-  !> Collective.
-  subroutine wake_disturbed(decomposition, halo, problem, rings, woken)
+  !> Wake the bodies that the impulses of a solve and those left out would move, and those around them. Collective.
+  subroutine wake_disturbed(decomposition, halo, physics, problem, rings, woken)
     type(decomposition_t), intent(inout) :: decomposition
     type(halo_t), intent(inout) :: halo
+    type(physics_t), intent(in) :: physics
     !> solved
     type(contact_problem_t), intent(in) :: problem
     !> how many neighbours away
     integer, intent(in) :: rings
     !> whether some body was woken; views and pairs to look at are those of before where none was
     logical, intent(out) :: woken
-    integer(i8), allocatable :: records(:, :), received(:, :)
-    integer, allocatable :: destination(:)
+    type(contacts_t) :: every(size(problem%sub))
+    type(impulses_t) :: borne(size(decomposition%owned))
     type(marks_t) :: around(size(halo%view))
     integer :: s, ring
 
-    call list_changes(decomposition, halo, problem, records, destination)
-    call sparse_exchange(decomposition%comm, records, destination, received)
-    call wake_changed(decomposition, received, woken)
+    do s = 1, size(problem%sub)
+      allocate (every(s)%are(problem%sub(s)%n_contacts), source=.true.)
+    end do
+    call find_borne(decomposition, halo, problem, every, .false., borne)
+    call wake_moved(decomposition, physics, problem%kernels%nw, borne, woken)
     woken = decomposition%comm%any_true(woken)
     if (.not. woken) return
     call halo%refresh(decomposition)
@@ -153,94 +150,49 @@ contains
     end do
   end subroutine wake_disturbed
 
-  !> Records (owner, grain, change) of the grains that sleep beside grains that are awake: how much the impulses on them differ from
-  !> their reference, summed over contacts [N s]. A contact that has ended counts as one without an impulse.
-  subroutine list_changes(decomposition, halo, problem, records, destination)
-    type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
-    type(contact_problem_t), intent(in) :: problem
-    integer(i8), allocatable, intent(out) :: records(:, :)
-    integer, allocatable, intent(out) :: destination(:)
-    type(change_t) :: change(size(halo%view))
-    real(dp) :: p(problem%kernels%nd)
-    integer :: s, k, w, c, n, round
-
-    do s = 1, size(halo%view)
-      associate (view => halo%view(s), list => halo%view(s)%list)
-        allocate (change(s)%of(view%bodies%n), source=0.0_dp)
-        if (.not. allocated(list%watched)) cycle
-        do w = 1, size(list%watched)
-          k = sleeper_of(view, list%watched(w))
-          if (k > 0) change(s)%of(k) = change(s)%of(k) + norm2(list%reference(:, list%watched(w)))
-        end do
-        do c = 1, problem%sub(s)%n_contacts
-          associate (source => problem%sub(s)%source(c))
-            k = sleeper_of(view, source)
-            if (k == 0) cycle
-            call problem%impulse_on_candidate(s, c, p)
-            change(s)%of(k) = change(s)%of(k) + norm2(p - list%reference(:, source)) - norm2(list%reference(:, source))
-          end associate
-        end do
-      end associate
-    end do
-    do round = 1, 2
-      n = 0
-      do s = 1, size(halo%view)
-        associate (view => halo%view(s))
-          do k = 1, view%bodies%n
-            if (.not. change(s)%of(k) > 0.0_dp) cycle
-            n = n + 1
-            if (round == 1) cycle
-            destination(n) = decomposition%comm%rank_of(view%owner(k), decomposition%n_subdomains)
-            records(1, n) = view%owner(k)
-            records(2, n) = view%bodies%id(k)
-            records(3, n) = transfer(change(s)%of(k), 0_i8)
-          end do
-        end associate
-      end do
-      if (round == 1) allocate (records(3, n), destination(n))
-    end do
-  end subroutine list_changes
-
-  !> Place in the view of the grain of pair `p` that sleeps, 0 for none.
-  pure integer function sleeper_of(view, p) result(k)
-    type(local_bodies_t), intent(in) :: view
-    integer, intent(in) :: p
-
-    k = view%list%candidate(p)
-    if (view%asleep(k)) return
-    k = max(view%list%antagonist(p), 0)
-    if (k == 0) return
-    if (.not. view%asleep(k)) k = 0
-  end function sleeper_of
-
-  !> Wake the grains of this rank on which impulses have changed by too much; the changes of several subdomains add up.
-  subroutine wake_changed(decomposition, received, woken)
+  !> Wake the grains of this rank that would get too large a momentum.
+  subroutine wake_moved(decomposition, physics, nw, borne, woken)
     type(decomposition_t), intent(inout) :: decomposition
-    !> (owner, grain, change), by the subdomain that sends them
-    integer(i8), intent(in), contiguous :: received(:, :)
+    type(physics_t), intent(in) :: physics
+    !> rows of an inverse mass
+    integer, intent(in) :: nw
+    !> impulses of the contacts that were solved
+    type(impulses_t), intent(in) :: borne(:)
     logical, intent(out) :: woken
-    type(change_t) :: change(size(decomposition%owned))
-    integer :: s, k, h, place
+    integer :: s, k
 
-    do s = 1, size(change)
-      allocate (change(s)%of(decomposition%owned(s)%n), source=0.0_dp)
-    end do
-    do k = 1, size(received, 2)
-      call decomposition%find_owned(received(1:2, k), h, place)
-      change(h)%of(place) = change(h)%of(place) + transfer(received(3, k), 0.0_dp)
-    end do
     woken = .false.
-    do s = 1, size(change)
+    do s = 1, size(borne)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (.not. change(s)%of(k) > owned%wakes_at(k)) cycle
+          if (.not. owned%sleeps(k)) cycle
+          if (.not. momentum_under(owned, k, borne(s)%on(:, k)) > owned%wakes_at(k)) cycle
           call owned%wake(k)
           woken = .true.
         end do
       end associate
     end do
-  end subroutine wake_changed
+
+  contains
+
+    !> Momentum that grain `k` would get from loads, from these impulses and from those of the contacts that are left out [N s].
+    pure real(dp) function momentum_under(bodies, k, impulse) result(momentum)
+      type(body_set_t), intent(in) :: bodies
+      integer, intent(in) :: k
+      !> (nv)
+      real(dp), intent(in) :: impulse(:)
+      real(dp), dimension(size(impulse)) :: v, total
+      real(dp) :: inverse(nw)
+
+      v(:) = 0.0_dp
+      total(:) = bodies%held(1:size(v), k) + impulse
+      call physics%accelerate(decomposition%figures, bodies, k, v)
+      call physics%find_inverse_mass(decomposition%figures, bodies, k, inverse)
+      call add_inverse_mass(inverse, total, v)
+      momentum = momentum_of(v, bodies%nd, bodies%radius(k), 1.0_dp/bodies%mass(k))
+    end function momentum_under
+
+  end subroutine wake_moved
 
   !> Wake what sleeps beside grains that are about to leave the scene, if some are, in views that are up to date. Collective.
   subroutine wake_left_behind(decomposition, halo)
@@ -325,11 +277,12 @@ contains
   !> Wake all bodies of this rank; views are to be brought up to date.
   pure subroutine wake_all(decomposition)
     type(decomposition_t), intent(inout) :: decomposition
-    integer :: s
+    integer :: s, k
 
     do s = 1, size(decomposition%owned)
-      decomposition%owned(s)%rest(:) = 0
-      decomposition%owned(s)%wakes_at(:) = 0.0_dp
+      do k = 1, decomposition%owned(s)%n
+        call decomposition%owned(s)%wake(k)
+      end do
     end do
   end subroutine wake_all
 

@@ -65,6 +65,10 @@ program test_step_parts
   call check_moving_plane("0.5")
   call check_chain_asleep()
   call check_chain_disturbed()
+  call check_turned_sleeper(0.24_dp, 1)
+  call check_turned_sleeper(0.36_dp, 2)
+  call check_swept_off()
+  call check_held()
   call check_left_behind()
   call check_starting_boundary()
   call check_projection()
@@ -692,19 +696,22 @@ contains
     counted = nint(comm%highest(most))
   end function counted
 
-  !> Wake grain `id`, and add to its vertical velocity.
-  subroutine push(sim, id, velocity)
+  !> Wake grain `id`, and add to its vertical velocity, or to another component.
+  subroutine push(sim, id, velocity, component)
     type(simulation_t), intent(inout) :: sim
     integer, intent(in) :: id
     real(dp), intent(in) :: velocity
-    integer :: s, k
+    integer, intent(in), optional :: component
+    integer :: s, k, d
 
+    d = 2
+    if (present(component)) d = component
     do s = 1, size(sim%decomposition%owned)
       associate (owned => sim%decomposition%owned(s))
         do k = 1, owned%n
           if (owned%id(k) /= id) cycle
           call owned%wake(k)
-          owned%velocity(2, k) = owned%velocity(2, k) + velocity
+          owned%velocity(d, k) = owned%velocity(d, k) + velocity
         end do
       end associate
     end do
@@ -838,8 +845,8 @@ contains
     call sim%make_whole()
     call check_equal(sim%problem%n_contacts, 3_i8, "the whole problem has all contacts")
     call check_close(sim%boundary_impulses(2, 1), -3*g*h, solved, "and the plane bears all three")
-    ! of the impulses on the disk below, 3 m g h, a twentieth is 0.0147 N s
-    call push(sim, 3, -0.014_dp)
+    ! of the impulses on the disk below, 3 m g h, a tenth is 0.0294 N s
+    call push(sim, 3, -0.029_dp)
     call advance(sim, figures)
     call check_equal(figures%tries, 1, "a small change is not noticed")
     call check_equal(figures%asleep, 2_i8, "the two others sleep on")
@@ -894,6 +901,89 @@ contains
     call check_equal(sim%problem%n_contacts, 3_i8, "all contacts are solved")
     call sim%free()
   end subroutine check_chain_disturbed
+
+  !> A disk spins upon one that sleeps, and gives it a tangential impulse of a third of m R w. The momentum m (|v| + R |w|) of the
+  !> sleeper by this is three times as large, as the moment of inertia is m R^2/2: it wakes where this exceeds a tenth of the normal
+  !> impulses on it, 0.3 m g h, though the impulse itself is less than half of that.
+  subroutine check_turned_sleeper(spin, tries)
+    !> [rad/s]
+    real(dp), intent(in) :: spin
+    integer, intent(in) :: tries
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+
+    call make_chain(sim, 2)
+    call push(sim, 2, spin, 3)
+    call advance(sim, figures)
+    call check_equal(figures%tries, tries, "a sleeper that is turned wakes where it would move")
+    call check_equal(figures%asleep, merge(1_i8, 0_i8, tries == 1), "and sleeps on where it would not")
+    call sim%free()
+  end subroutine check_turned_sleeper
+
+  !> What lies on a sleeper is swept away so fast that the pair is no longer near: the sleeper wakes, and its support bears it
+  !> alone.
+  subroutine check_swept_off()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+
+    call make_chain(sim, 2)
+    call push(sim, 2, 0.0_dp)
+    call advance(sim, figures)
+    call check_equal(figures%asleep, 1_i8, "it sleeps beside what lies on it, and is awake")
+    call push(sim, 2, 300.0_dp, 1)
+    call advance(sim, figures)
+    call check_equal(figures%tries, 2, "a load that is swept away is noticed")
+    call check_close(sim%boundary_impulses(2, 1), -g*h, solved, "and the plane bears the disk that stays")
+    call sim%free()
+  end subroutine check_swept_off
+
+  !> What a sleeper bears of the contacts that are left out: its weight where all sleep, with the weight of the disks upon it where
+  !> these are awake; nothing where it is awake itself.
+  subroutine check_held()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    call make_chain(sim)
+    do k = 1, 3
+      call check_close(held(sim, k), g*h, solved, "contacts that are left out bear a disk")
+    end do
+    do k = 1, 2
+      call push(sim, 3, -0.02_dp)
+      call advance(sim, figures)
+      call check_equal(figures%asleep, 2_i8, "the two disks below sleep on")
+      call check_close(held(sim, 1), g*h, solved, "between contacts that are left out")
+      call check_close(held(sim, 2), 2*g*h, solved, "with the upper disk upon what they bear")
+      call check_close(held(sim, 3), 0.0_dp, 0.0_dp, "which is awake")
+    end do
+    do k = 1, 6
+      call advance(sim, figures)
+    end do
+    call check_equal(figures%asleep, 3_i8, "all sleep again")
+    do k = 1, 3
+      call check_close(held(sim, k), g*h, solved, "as they did before")
+    end do
+    call sim%wake()
+    call check_close(held(sim, 1), 0.0_dp, 0.0_dp, "what is awake bears nothing of them")
+    call sim%free()
+  end subroutine check_held
+
+  !> Vertical impulse that grain `id` bears of the contacts that are left out: the same on all ranks [N s].
+  real(dp) function held(sim, id)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: id
+    integer :: s, k
+
+    held = -huge(1.0_dp)
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) == id) held = owned%held(2, k)
+        end do
+      end associate
+    end do
+    held = comm%highest(held)
+  end function held
 
   !> What sleeps on a grain that leaves the scene wakes in that step, and falls.
   subroutine check_left_behind()

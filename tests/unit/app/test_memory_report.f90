@@ -35,9 +35,9 @@ program test_memory_report
     call check_equal(other(near_pair), plain(near_pair), "near pair with friction and no warm start")
     call check_equal(other(at_home) - plain(at_home), int(spin(nd) + inertia, i8), "grain with friction: spin and inertia")
     call count_bytes(nd, "friction = 0", "warm_start = .true., sleeping = .true.", "", other)
-    call check_more(0, 16 + 8*nd, 0, "bodies that may sleep have a reference, a mark and a place", 24)
+    call check_more(0, 16, 0, "bodies that may sleep have impulses that they bear, pairs a mark and a place", 24 + 16*nd)
     call count_bytes(nd, "friction = 0", "warm_start = .true., sleeping = .true.", bridges, other)
-    call check_more(8, 20 + 8*nd, 8*nd, "bridges have a state, and attract", 24)
+    call check_more(8, 20, 8*nd, "bridges have a state, and attract", 24 + 16*nd)
   end do
   call finish_checks()
   call comm%free()
@@ -109,9 +109,9 @@ contains
         & (8*size(sub%gap) + 4*size(sub%source))/sub%n_contacts
       if (allocated(sub%attraction)) bytes(contact) = bytes(contact) + 8*size(sub%attraction)/room
       bytes(near_pair) = (4*size(view%list%candidate) + 4*size(view%list%antagonist) + 4*size(view%list%shift) + &
-        & 8*size(view%list%impulse) + 8*size(view%list%reference) + 4*size(view%list%state))/view%list%n
+        & 8*size(view%list%impulse) + 4*size(view%list%state))/view%list%n
       ! made once a body sleeps
-      if (size(view%list%reference) > 0) bytes(near_pair) = bytes(near_pair) + 4
+      if (view%list%memory%touch_row > 0) bytes(near_pair) = bytes(near_pair) + 4
       bytes(body) = (8*size(sub%id) + 8*size(sub%v_free) + 8*size(sub%velocity) + 8*size(sub%v_global) + 8*size(sub%reaction) + &
         & 8*size(sub%inverse_mass) + 8*size(sub%weight))/sub%n_columns + (4*size(sub%owner) + &
         & 4*size(sub%multiplicity))/sub%n_bodies + (4*size(sub%place) + 8*size(sub%radius))/sub%n_grains
@@ -126,7 +126,7 @@ contains
 
     bytes = (8*size(bodies%id) + 8*size(bodies%position) + 8*size(bodies%velocity) + 8*size(bodies%radius) + 8*size(bodies%mass) + &
       & 8*size(bodies%inertia) + 4*size(bodies%glued) + 4*size(bodies%material) + 4*size(bodies%image) + &
-      & 4*size(bodies%rest) + 8*size(bodies%wakes_at))/bodies%n
+      & 4*size(bodies%rest) + 8*size(bodies%wakes_at) + 8*size(bodies%held))/bodies%n
   end function grain_bytes
 
 end program test_memory_report

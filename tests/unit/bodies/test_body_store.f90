@@ -3,7 +3,7 @@ program test_body_store
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
-  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, collect_fields, place_word, rest_words, body_record
+  use gravier_body_store, only: body_layout_t, body_set_t, append_bodies, collect_fields, place_word, body_record
   use gravier_field_list, only: field_list_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -280,14 +280,15 @@ contains
     type(body_layout_t) :: layout
     type(body_set_t) :: bodies, others
     integer(i8), allocatable :: record(:), renewed(:)
+    integer :: first
 
     layout = body_layout_t(sizes(1), sizes(2), sizes(3))
     call others%init(layout, 2)
     call check(.not. others%sleeps(1), "where none may sleep none does")
-    call check_equal(size(others%rest) + size(others%wakes_at), 0, "and nothing is kept for it")
+    call check_equal(size(others%rest) + size(others%wakes_at) + size(others%held), 0, "and nothing is kept for it")
     layout%nr = 1
     call bodies%init(layout, 2)
-    call check_equal(layout%saved_words(), others%saved_words() + rest_words, "words of the rest in a checkpoint")
+    call check_equal(layout%saved_words(), others%saved_words() + layout%rest_words(), "words of the rest in a checkpoint")
     call check(bodies%rest(2) == 0 .and. .not. bodies%sleeps(2), "a new body is awake")
     bodies%id(:) = [3_i8, 5_i8]
     bodies%radius(:) = 1.0_dp
@@ -300,18 +301,24 @@ contains
     bodies%rest(2) = 7
     call check(.not. bodies%sleeps(2), "a body that has rested for some steps is awake")
     bodies%wakes_at(2) = 0.25_dp
+    bodies%held(:, 2) = 0.5_dp
     allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
     call bodies%get_record(2, record)
-    call check_equal(record(layout%saved_words() - 1), 7_i8, "steps at rest come last but one")
+    first = layout%saved_words() - layout%rest_words() + 1
+    call check_equal(record(first), 7_i8, "steps at rest come first of what is known of its rest")
     call others%init(layout, 2)
     call others%set_record(1, record)
     call check(others%sleeps(1) .and. others%rest(1) == 7, "a body that travels sleeps on")
+    call check(size(others%held, 1) == sizes(2) .and. all(abs(others%held(:, 1) - 0.5_dp) < 1.0e-15_dp), &
+      & "and bears what it has borne")
     call bodies%get_renewed(2, renewed)
     call others%set_renewed(2, renewed)
     call check(others%sleeps(2), "its copies know of it")
     call others%wake(2)
     call check(.not. others%sleeps(2) .and. others%rest(2) == 0, "a body that wakes counts from the start")
-    record(layout%saved_words() - 1) = -1
+    call others%wake(1)
+    call check(.not. any(abs(others%held) > 0.0_dp), "and bears nothing of contacts that are left out")
+    record(first) = -1
     call check(layout%invalid_field(record, 0, 0, 0) == "rest", "no body has rested for less than no step")
   end subroutine test_rest
 

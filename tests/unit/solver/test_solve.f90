@@ -117,6 +117,8 @@ program test_solve
   call test_descent()
   call test_at_the_start()
   call test_warm_start()
+  call test_rest_after_shock(2, .false.)
+  call test_rest_after_shock(3, .true.)
   call test_work()
   call test_exact_criterion()
   call test_divergence()
@@ -405,6 +407,38 @@ contains
     call check_equal(report%iterations, 0, "warm start: iterations")
     call sim%free()
   end subroutine test_warm_start
+
+  !> A solve that starts from impulses 10^12 times those that it ends with loses the roundings of these on the way: its velocities
+  !> are those of the solution, and those that sweeps work with are the same.
+  subroutine test_rest_after_shock(dimension, accelerated)
+    integer, intent(in) :: dimension
+    logical, intent(in) :: accelerated
+    type(simulation_t) :: sim
+    type(nlgs_t) :: nlgs
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(error_t), allocatable :: error
+    integer :: c
+
+    call make_column(sim, dimension, 4, 0.3_dp)
+    do c = 1, 4
+      sim%problem%sub(1)%impulse(lane_of(c), 1, block_of(c)) = 1.0e12_dp*c
+    end do
+    nlgs%acceleration%on = accelerated
+    control%tolerance = 1.0e-10_dp
+    control%check_every = 1
+    control%max_iterations = 2000
+    call solve_contacts(sim%problem, nlgs, control, report, error)
+    call check_equal(report%status, solve_converged, "after a shock: converged")
+    call check_equal(nlgs%work%solves, 1_i8, "after a shock: one solve")
+    associate (sub => sim%problem%sub(1))
+      ! roundings of the shock would be 1e-4 of the velocity that a grain falls at
+      call check(maxval(abs(sub%v_global(1:dimension, 1:4))) < 1.0e-7_dp, "after a shock: rest")
+      call check(maxval(abs(sub%velocity(1:dimension, 1:4) - sub%v_global(1:dimension, 1:4))) < 1.0e-9_dp, &
+        & "after a shock: sweeps have the velocities of the impulses")
+    end associate
+    call sim%free()
+  end subroutine test_rest_after_shock
 
   !> Sweeps and relaxations are counted: n_GS sweeps in each iteration, each of all contacts.
   subroutine test_work()
