@@ -134,7 +134,7 @@ contains
       if (tally%mended_share() > often_mended) then
         text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "//steps
         if (tally%shift < little*tally%path) then
-          text = text//", by "//to_text(100.0_dp*tally%shift/tally%path, 2)//" % of the paths of grains"
+          text = text//", by "//plain(100.0_dp*tally%shift/tally%path)//" % of the paths of grains"
         else
           text = text//": the results are not those of the contact law"
         end if

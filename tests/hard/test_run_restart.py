@@ -374,10 +374,17 @@ class Restart(RunTestCase):
             run = run_case(merged(longer, {"output": {option: other}}), 1, directory, options=["--restart"])
             self.assert_refused(run, rf"results/history\.csv: line 1: (no|a) column [\w: ]+: &output {option} = \.{str(other).lower()}\., "
                                      rf"but \.{str(not other).lower()}\. was expected, with which this table was begun$")
-            # the log is begun by then
-            self.assertTrue(files()["run.log"].startswith(now["run.log"]))
-            self.assertEqual({**files(), "run.log": now["run.log"]}, now)
-        write(os.path.join(results, "run.log"), now["run.log"])
+            self.assertEqual(files(), now)
+            self.assertEqual(run.stdout, "")
+        history = before["history.csv"].split(b"\n")
+        for rows, words in ((history[:2] + history[3:], "line 3: step 3, but rows of step 2 were expected"),
+                            (history[:3] + [b""], "its last row is of step 2, but rows up to step 4 were expected")):
+            write(os.path.join(results, "history.csv"), b"\n".join(rows))
+            now = files()
+            for ranks in (1, 2):
+                refused(longer, r"results/history\.csv: " + words, ranks)
+        write(os.path.join(results, "history.csv"), before["history.csv"])
+        now = before
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.011\n")
         refused(longer, r"checkpoint\.h5: the run began with 2 grains")
         write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0.0,0.02,0.01\n2,0.03,0.02,0.012\n")

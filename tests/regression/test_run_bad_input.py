@@ -32,6 +32,8 @@ def key(group, name, value, *words, also=None, kind=None):
 
 
 PLANE = {"shape": "plane", "point": [0.0, -0.1], "normal": [0.0, 1.0]}
+LID = {"name": "lid", "shape": "plane", "point": [0.0, 1.0], "normal": [0.0, -1.0], "free": [False, True], "mass": 1.0}
+LEFT, RIGHT = ({"shape": "plane", "point": [x, 0.0], "normal": [-x, 0.0]} for x in (-1.0, 1.0))
 CASE_3D = merged(CASE, {"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
 
 
@@ -74,6 +76,7 @@ FILES = [
     ("quote not closed", GOOD.replace("'results'", "'results"), ("&output directory", "expected a quote that closes")),
     ("no equal sign", GOOD + "&solver sweeps 2 /\n", ("&solver", "expected key = value", "sweeps 2")),
     ("word without quotes", GOOD + "&solver method = nscdd /\n", ("&solver method = nscdd", "'nscdd_ep'")),
+    key("output", "fclib_step", "3", "at most steps = 2"),
     key("output", "final_forces", ".true.", "without final_bodies = .true."),
     # the type
     key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),
@@ -142,6 +145,17 @@ FILES = [
         ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
         ("normal", "0, 0", ("not all 0",), {"shape": "plane"}),
     )),
+    boundary_key("velocity", "0.0, 0.1", "0 along each component that is free", also=LID),
+    # a pressure without an area
+    *((title, case(COLUMN, {"boundary": [{**LID, "pressure": 10.0, **lid}, *sides]}), ("boundary 'lid': pressure: expected", words))
+      for title, lid, sides, words in (
+        ("pressure between no sides", {}, [], "two planes that face each other along x in the whole run, or a period, because their distance gives the area; or `force` instead"),
+        ("pressure beside one side", {}, [LEFT], "face each other along x"),
+        ("pressure between sides of which one goes", {}, [LEFT, {**RIGHT, "remove_at": 1.0}], "face each other along x"),
+        ("pressure on what is oblique", {"normal": [0.3, -1.0]}, [LEFT, RIGHT], "a plane whose normal lies along an axis"))),
+    ("pressure on a side of an open cell", case(COLUMN, {"scene": {"dimension": 3, "period": [0.0, 1.0, 0.0]}, "boundary": [
+        {**LID, "normal": [-1.0, 0.0, 0.0], "point": [1.0, 0.0, 0.0], "free": [True, False, False], "pressure": 1.0}]}),
+     ("boundary 'lid': pressure: expected", "along z")),
     *((title, case({"scene": {"period": [1.0, 0.0]}, "boundary": boundary}), ("boundary 'boundary 1': expected", *words, "axis x"))
       for title, boundary, words in (
         ("plane across a period", {"shape": "plane", "point": [-0.1, 0.0], "normal": [1.0, 0.0]}, ("a normal at right angles",)),
@@ -532,6 +546,25 @@ class BadInput(RunTestCase):
             return "case.nml"
         self.refuse_all([(path, path, ("&output directory", f"'{path}'", "expected a directory that can be written to"))
                          for path in ("file", "file/below", "/proc/nowhere", "/proc/self")], prepare_output)
+
+    def test_inputs_that_the_run_would_replace(self):
+        def prepare_input_among_outputs(directory, name, groups):
+            os.mkdir(os.path.join(directory, "out"))
+            write(os.path.join(directory, "out", name), "a file of mine\n")
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"output": {"directory": "./out/"}}, groups)))
+            return "case.nml"
+        file = {"bodies": "file", "lattice_count": None, "radius_min": None, "radius_max": None}
+        self.refuse_all([(f"{key} {name}", name, groups, (f"{key} = 'out/{name}'", f"its own {name}", "expected a copy in another place"))
+                         for key, name, groups in (
+            ("&scene bodies_file", "final_bodies.h5", {"scene": {**file, "bodies_file": "out/final_bodies.h5"}, "output": {"final_bodies": True}}),
+            ("&scene gravity_table", "history.csv", {"scene": {"gravity_table": "out/history.csv"}}),
+            ("&scene shapes", "run.log", {"scene": {**file, "bodies_file": "b.csv", "shapes": "out/run.log"}}),
+            ("&boundary 'floor' table", "trace.csv", {"boundary": {**PLANE, "name": "floor", "table": "out/trace.csv"}, "output": {"trace": True}}),
+            ("&boundary 'hopper' file", "bodies.vtkhdf", {"boundary": {"shape": "mesh", "name": "hopper", "file": "out/bodies.vtkhdf"},
+                                                          "output": {"vtk": True}}),
+            ("&insertion 'feed' radius_table", "step_2.hdf5", {
+                "insertion": {"name": "feed", "lower": [0.0, 1.0], "upper": [0.1, 1.1], "rate": 1.0, "radii": "table",
+                              "radius_table": "out/step_2.hdf5"}, "output": {"fclib_step": 2}}))], prepare_input_among_outputs)
 
     def test_command_line(self):
         write(self.here("case.nml"), GOOD)

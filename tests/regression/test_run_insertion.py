@@ -204,6 +204,18 @@ class Insertion(RunTestCase):
         self.assert_status(limited, 0)
         total = limited.history()["entered_mass"].sum()
         self.assertTrue(3.0 - 2000.0 * np.pi * 0.006 ** 2 < total <= 3.0, total)
+        for each in (run, limited):
+            self.assertIn("all that its bounds allow", each.stdout)
+            self.assertNotIn("fewer than its rate owes", each.stdout)
+
+    def test_no_rest_before_grains_enter(self):
+        """Neither an empty scene before its start nor one that waits for the next grain is at rest; a scene that is complete is."""
+        rules = {"time": {"steps": 4000, "rest_energy": 1e-5}}
+        run = run_case(merged(changed(rate=20.0, count=3, start=0.05), rules), directory=self.here("rest"))
+        self.assert_status(run, 0)
+        self.assertEqual(run.history()["entered"].sum(), 3)
+        self.assertIn("at rest     after step", run.stdout)
+        self.assertGreater(len(run.history()["step"]), 200 + 10)
 
     def test_start_and_end(self):
         run = run_case(changed(start=0.05, end=0.1), directory=self.here("times"))

@@ -46,6 +46,28 @@ class LastWords(RunTestCase):
                                         "radius_min": None, "radius_max": None},
                               "time": {"steps": 5}, "output": {"final_bodies": False}})
 
+    def test_older_files(self):
+        """Files of an older run that this one does not replace are named once, by the run that finds them."""
+        case = {**PAIR, "output": {"directory": "results"}}
+        said = [line(run_case(merged(case, {"output": more}), 1, self.here("older")), "warning     results holds")
+                for more in ({"trace": True, "final_bodies": True}, {}, {"trace": True, "final_bodies": True})]
+        self.assertEqual(said, ["", "warning     results holds files of an older run, which stay as they are: trace.csv, final_bodies.h5", ""])
+
+    def test_reported_errors(self):
+        """What a solve that has converged reports is within the accuracy, also soon after a pass over layers."""
+        run = run_case({"scene": {"dimension": 2, "bodies": "column", "column_count": 200}, "time": {"step": 1e-3, "steps": 10},
+                        "output": {"directory": "results", "every": 0}}, 1, self.here("column"))
+        self.assert_status(run, 0)
+        history = run.history()
+        self.assertIn("made a pass over layers", run.stdout)
+        self.assertLessEqual((history["velocity_error"] / history["velocity_scale"]).max(), 0.1)
+
+    def test_small_shifts(self):
+        """Shifts that are small against the paths of grains are named, and said to be no other law."""
+        write(self.here("fast.csv"), f"id,x,y,radius,vx\n1,0,0,{RADIUS},3\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3\n")
+        run = run_case(merged(PAIR, {"scene": {"bodies_file": "../fast.csv"}, "time": {"steps": 9, "step": 1e-2}}), 1, self.here("fast"))
+        self.assertRegex(line(run, "finished"), r"overlaps were mended in 11 % of them, by 0\.65 % of the paths of grains; results in")
+
     def test_mended(self):
         """Lengths of shifts are those of the formula, and the last line says so in more than a tenth of the steps, on any ranks. In the
         later steps the overlap exceeds what is allowed by rounding at most, which does not count."""

@@ -86,6 +86,22 @@ class Scales(RunTestCase):
         self.figures(text, rf"velocity errors are compared with U = {NUMBER} m/s \(drive\)", 2e-3)
         self.assertNotIn("g h", text)
 
+    def test_heavy_lid(self):
+        """A lid whose load gives it less than what solves may be wrong by: the warning ends at the mass that it names."""
+        lid = {"name": "lid", "shape": "plane", "point": [0.0, 1.0], "normal": [0.0, -1.0], "free": [False, True], "force": [0.0, -10.0]}
+
+        def said(mass):
+            text = self.check_case(LATTICE, {"boundary": [*LATTICE.get("boundary", []), {**lid, "mass": mass}]})
+            return [each for each in self.warnings(text) if "its load gives it" in each]
+        # F h/m = 0.1 g h
+        most = 10.0 / (0.1 * G)
+        self.assertEqual(said(0.99 * most), [])
+        self.assertEqual(len(said(1.01 * most)), 1)
+        found = re.search(rf"'lid': its load gives it {NUMBER} m/s in a step, less than the error of {NUMBER} m/s .* at most {NUMBER} kg would do",
+                          said(1e6)[0])
+        for text, value in zip(found.groups(), (10.0 * 1e-3 / 1e6, 0.1 * G * 1e-3, most)):
+            self.assertAlmostEqual(float(text) / value, 1.0, delta=6e-3)
+
     def test_ranks(self):
         said = [[line for line in self.check_case(SHEAR, {"solver": {"method": "nscdd", "tolerance": 0.1}, "decomposition": {"subdomains": 3}},
                                                   ranks=ranks).splitlines() if re.match("scales|warning|            ", line)]

@@ -70,7 +70,8 @@ class ShapeBalances(RunTestCase):
         rows = [body("askew", [0.0, 0.0, 0.3], [1.0, 0.3, 0.2, 0.1], [0.5, 0.0, -2.0], [6.0, -4.0, 9.0])]
         for title, friction, restitution in (("rebound", 0.0, 1.0), ("rough", 0.4, 0.5)):
             run = self.play(title, 3, rows, [ground(3)], {"scene": {"friction": friction, "restitution": restitution, "overlap_projection": False},
-                                                         "time": {"steps": 400}, "output": {"energy": True}, "solver": {"method": "newton"}})
+                                                         "time": {"steps": 400}, "output": {"energy": True},
+                                                         "solver": {"method": "newton", "accuracy": 1e-9}})
             history = run.history()
             self.assertGreater(history["contacts"].sum(), 0)
             turnover = sum(np.abs(history[name]) for name in TERMS).max()

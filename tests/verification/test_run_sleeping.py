@@ -158,7 +158,8 @@ class Sleeping(RunTestCase):
         many contacts as without sleep. What is shown changes no bit of the motion."""
         weight = 9.81 * sum(grain.mass for grain in self.grains[:2 * HEAP])
         steps = {"time": {"steps": IMPACT + 10}}
-        shown = merged(self.case, SLEEPING, steps, {"output": {"every": 3, "boundary_forces": True, "stress": True, "checkpoint_every": 0}})
+        shown = merged(self.case, SLEEPING, steps, {"output": {"every": 3, "boundary_forces": True, "stress": True, "energy": True,
+                                                                    "checkpoint_every": 0}})
         hidden = merged(self.case, SLEEPING, steps, {"output": {"every": 0, "checkpoint_every": 0}})
         runs = each(lambda name, case: run_case(case, 2, f"{self.scratch}/{name}"), [("shown", shown), ("hidden", hidden)])
         for run in runs:
@@ -167,6 +168,9 @@ class Sleeping(RunTestCase):
         last = IMPACT - 10
         self.assertGreater(history["sleeping"][last - 1], 0.95 * history["contacts"][last - 1])
         self.assertLess(abs(history["force_y:boundary 1"][last - 1] + weight), 0.01 * weight)
+        # nothing is turned over while all sleep but the disk that falls
+        for name in ("dissipated_normal", "dissipated_friction", "energy_error"):
+            self.assertLess(np.ptp(history[name][last - 40:last]), 1e-12, name)
         forces = results[f"/steps/{last}/boundaries/force"]
         self.assertLess(abs(forces[0, 1] + weight), 0.01 * weight)
         self.assertEqual(len(results[f"/steps/{last}/contacts/gap"]), history["contacts"][last - 1])

@@ -144,9 +144,12 @@ contains
         last = first + last - 1
         row = row//text(first:last - 1)
         call check_row(path, line, n_columns, row, step, error)
-        if (.not. allocated(error) .and. before >= 0 .and. step > before + 1) call raise(error, status_input, path// &
-          & ": line "//to_text(line)//": step "//to_text(step)//", but rows of step "//to_text(before + 1)//" were expected")
         if (allocated(error) .or. step > last_step) exit rows
+        if (before >= 0 .and. step > before + 1) then
+          call raise(error, status_input, path//": line "//to_text(line)//": step "//to_text(step)//", but rows of step "// &
+            & to_text(before + 1)//" were expected")
+          exit rows
+        end if
         before = step
         kept = position + last
         line = line + 1

@@ -38,6 +38,10 @@ module gravier_check_schedule
   !> ratio of a figure to what the sweeps before it moved impulses by, until a check has measured it, for accelerated sweeps
   real(dp), parameter :: first_ratio = 0.5_dp
 
+  !> what a ratio is that of: none is known; a check that found a bound, because the estimate was not asked for; a solve before this
+  !> one; a check that found the estimate. A later one tells more.
+  integer, parameter :: no_check = 0, bound = 1, solve_before = 2, estimate = 3
+
   type :: check_schedule_t
     !> iterations between two regular checks
     integer :: check_every = 10
@@ -51,7 +55,9 @@ module gravier_check_schedule
     logical :: settled = .false.
     !> figure at the last check over what the sweeps before it moved impulses by, relative to them; before that what a solve before
     !> this one has ended with; 0 where it is not known
-    real(dp) :: ratio = 0.0_dp
+    real(dp), private :: ratio = 0.0_dp
+    !> one of the constants above: what it is the ratio of
+    integer, private :: ratio_of = no_check
     !> what the sweeps before the last check moved impulses by
     real(dp), private :: progress = 0.0_dp
     real(dp), private :: last_figure = huge(1.0_dp), pause = 0.0_dp
@@ -61,8 +67,10 @@ module gravier_check_schedule
   contains
     procedure :: first_check => check_schedule_first_check
     procedure :: calls => check_schedule_calls
+    procedure :: take_ratio => check_schedule_take_ratio
     procedure :: note_check => check_schedule_note_check
     procedure :: forget_ratio => check_schedule_forget_ratio
+    procedure :: mean_ratio => check_schedule_mean_ratio
   end type check_schedule_t
 
 contains
@@ -157,10 +165,13 @@ contains
     integer, intent(in) :: iteration
     !> the figure that is expected is far from the goal
     logical, intent(in) :: is_far
-    integer :: regular
+    integer :: left_out
 
-    regular = 1 + merge(most_left_out_far, most_left_out, is_far)
-    is_long_ago = iteration - self%last_check >= max(most_pause*iteration, real(regular*self%check_every, dp))
+    left_out = 0
+    if (self%ratio_of >= solve_before) left_out = most_left_out
+    if (self%ratio_of == estimate .and. is_far) left_out = most_left_out_far
+    is_long_ago = iteration - self%last_check >= most_pause*iteration
+    if (left_out > 0) is_long_ago = is_long_ago .and. iteration - self%last_check >= (1 + left_out)*self%check_every
   end function is_long_ago
 
   !> Growth of the changes that is worth a check: methods that lower what makes them grow are left to do so.
@@ -168,6 +179,15 @@ contains
     class(method_t), intent(in) :: method
     growth = merge(growth_limit, 1.0_dp, method%mends_growth())
   end function watched_growth
+
+  !> Take the ratio of a solve before this one; none where that is 0.
+  pure subroutine check_schedule_take_ratio(self, ratio)
+    class(check_schedule_t), intent(inout) :: self
+    real(dp), intent(in) :: ratio
+
+    self%ratio = ratio
+    self%ratio_of = merge(solve_before, no_check, ratio > 0.0_dp)
+  end subroutine check_schedule_take_ratio
 
   !> A check was made after an iteration, and found this figure.
   pure subroutine check_schedule_note_check(self, iteration, figure, goal, is_known)
@@ -182,7 +202,10 @@ contains
       if (self%by_estimate .and. .not. figure <= near_the_goal*goal) self%earliest = max(early_check, self%trusted)
     else
       ! the ratio of a bound tells less than that of a solve before
-      if (self%progress > 0.0_dp .and. (is_known .or. .not. self%ratio > 0.0_dp)) self%ratio = figure/self%progress
+      if (self%progress > 0.0_dp .and. (is_known .or. self%ratio_of < solve_before)) then
+        self%ratio = figure/self%progress
+        self%ratio_of = merge(estimate, bound, is_known)
+      end if
       self%pause = merge(0.0_dp, min(2.0_dp*max(self%pause, 1.0_dp), most_pause*iteration), figure < falling*self%last_figure)
     end if
     self%last_figure = figure
@@ -193,6 +216,17 @@ contains
   pure subroutine check_schedule_forget_ratio(self)
     class(check_schedule_t), intent(inout) :: self
     self%ratio = 0.0_dp
+    self%ratio_of = no_check
   end subroutine check_schedule_forget_ratio
+
+  !> The ratio at the end of a solve, as the geometric mean with that before it where there is one.
+  pure real(dp) function check_schedule_mean_ratio(self, before) result(ratio)
+    class(check_schedule_t), intent(in) :: self
+    !> 0 for none
+    real(dp), intent(in) :: before
+
+    ratio = self%ratio
+    if (before > 0.0_dp) ratio = sqrt(before*self%ratio)
+  end function check_schedule_mean_ratio
 
 end module gravier_check_schedule

@@ -48,7 +48,8 @@ module gravier_solve
     logical :: trace = .false.
     !> try a start that carries loads across layers
     logical :: layered = .true.
-    !> `figure_ratio` of the report of a solve before this one, 0 where there was none: it tells when checks are worth making
+    !> `figure_ratio` of the report of a solve before this one, 0 where there was none: it tells when checks
+    !> of accelerated sweeps that ask for the velocity error are worth making
     real(dp) :: figure_ratio = 0.0_dp
   end type solve_control_t
 
@@ -88,7 +89,8 @@ module gravier_solve
     !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
     !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
     real(dp) :: figure = 0.0_dp, goal = 0.0_dp
-    !> that figure over what the last iteration moved impulses by, relative to them; 0 of a solve that did not end by an estimate
+    !> that figure over what the last iteration moved impulses by, relative to them; the geometric mean of it and of that of the
+    !> control, where there is one, because single solves scatter; 0 of a solve that tells nothing to the next one
     real(dp) :: figure_ratio = 0.0_dp
     !> of a solve that stagnated
     type(creep_t) :: creep
@@ -179,7 +181,8 @@ contains
       call state%velocity%tests%keep_copy(problem, method, report%iterations)
       if (present(watch)) call watch%look(report)
     end do
-    if (report%status == solve_converged .and. has_estimate(state)) report%figure_ratio = state%schedule%ratio
+    if (report%status == solve_converged .and. report%iterations > copies_ready .and. has_estimate(state)) &
+      & report%figure_ratio = state%schedule%mean_ratio(control%figure_ratio)
     report%layered = state%trial%layered
     report%layered_sweeps = state%trial%sweeps
     if (report%status /= solve_converged .and. report%status /= solve_diverged .and. method%keeps_best) &
@@ -203,7 +206,7 @@ contains
     state%schedule%chooses = .not. (control%trace .or. control%criterion == by_error)
     state%schedule%by_estimate = state%by_estimate
     state%schedule%trusted = copies_ready
-    state%schedule%ratio = control%figure_ratio
+    if (state%by_estimate .and. method%acceleration%on) call state%schedule%take_ratio(control%figure_ratio)
     report%goal = merge(control%accuracy, control%tolerance, state%by_estimate)
     report%velocity_scale = problem%error_scale
     report%violation_allowed = violations_allowed*control%accuracy*problem%error_scale

@@ -61,10 +61,11 @@ contains
     integer, allocatable :: order(:)
     integer :: b, k
 
-    allocate (order(solved%n_grains))
-    id = solved%id(1:solved%n_grains)
-    call argsort(id, order)
-    id(:) = id(order)
+    allocate (order(solved%n_grains), id(solved%n_grains))
+    call argsort(solved%id(1:solved%n_grains), order)
+    do b = 1, solved%n_grains
+      id(b) = solved%id(order(b))
+    end do
     do b = 1, whole%n_grains
       k = find_sorted(id, whole%id(b))
       whole%v_global(:, b) = 0.0_dp

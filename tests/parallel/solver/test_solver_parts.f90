@@ -20,6 +20,7 @@ program test_solver_parts
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_residual_verdict, only: find_residual_verdict, excess_of, residual_ends, residual_waits, residual_in_vain
   use gravier_check_schedule, only: check_schedule_t
+  use gravier_fresh_start, only: fresh_start_t
   use gravier_stagnation, only: stagnation_t
   use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, speed_against
   use gravier_creeping_groups, only: creep_t, find_creep
@@ -53,6 +54,7 @@ program test_solver_parts
   call test_schedule(.true.)
   call test_schedule_of_estimates()
   call test_ratio_of_a_run()
+  call test_fresh_start()
   call check_vain_impulses()
   call check_stagnation()
   call check_creep(1)
@@ -411,7 +413,7 @@ contains
   end subroutine test_schedule_of_estimates
 
   !> A solve that knows the ratio by which the last one ended, 10: no check where it does not expect the goal, but for regular ones,
-  !> of which one is left out, or three far from the goal; one as soon as it expects the goal.
+  !> of which one is left out, or three far from the goal by a ratio of its own; one as soon as it expects the goal.
   subroutine test_ratio_of_before(problem, method)
     type(contact_problem_t), intent(inout) :: problem
     type(nlgs_t), intent(in) :: method
@@ -424,17 +426,20 @@ contains
     call schedule%note_check(0, 1.0_dp, 1.0e-3_dp, is_known=.false.)
     call set_progress(problem, 1.0e-4_dp)
     call check(calls(schedule, problem, method, 4), "a settled scene is checked as soon as the estimate is trusted")
-    schedule%ratio = 10.0_dp
+    call schedule%take_ratio(10.0_dp)
     call set_progress(problem, 1.4e-4_dp)
     call check_equal(first_call(schedule, problem, method), 20, "1.4 times the goal is expected: the second regular check")
-    call set_progress(problem, 1.6e-4_dp)
-    call check_equal(first_call(schedule, problem, method), 40, "1.6 times the goal is expected: the fourth")
     call set_progress(problem, 0.9e-4_dp)
     call check_equal(first_call(schedule, problem, method), 4, "the goal is expected")
     call schedule%note_check(4, 1.0_dp, 1.0e-3_dp, is_known=.false.)
-    call check_close(schedule%ratio, 10.0_dp, 0.0_dp, "a bound tells less than the solve before")
+    call check_close(schedule%mean_ratio(0.0_dp), 10.0_dp, 0.0_dp, "a bound tells less than the solve before")
     call schedule%note_check(4, 1.8e-3_dp, 1.0e-3_dp, is_known=.true.)
-    call check_close(schedule%ratio, 20.0_dp, 1.0e-12_dp, "an estimate tells more")
+    call check_close(schedule%mean_ratio(0.0_dp), 20.0_dp, 1.0e-12_dp, "an estimate tells more")
+    call check_close(schedule%mean_ratio(5.0_dp), 10.0_dp, 1.0e-12_dp, "what is left to the next solve is a mean")
+    call set_progress(problem, 0.7e-4_dp)
+    call check_equal(first_call(schedule, problem, method), 30, "1.4 times the goal is expected: the second regular check since")
+    call set_progress(problem, 0.8e-4_dp)
+    call check_equal(first_call(schedule, problem, method), 50, "1.6 times the goal is expected: the fourth since")
   end subroutine test_ratio_of_before
 
   !> The first iteration after which a schedule calls for a check, with the goal 1e-3.
@@ -448,7 +453,7 @@ contains
     end do
   end function first_call
 
-  !> The ratio goes from the solve of one step to that of the next: where one is far too large 40 iterations follow the check that
+  !> The ratio goes from the solve of one step to that of the next: where one is far too large 20 iterations follow the check that
   !> passes over layers ask for, and the estimate that the next check finds corrects it. A plane that moves along the column
   !> keeps it from rest.
   subroutine test_ratio_of_a_run()
@@ -462,11 +467,38 @@ contains
     sim%figure_ratio = 1.0e12_dp
     call sim%advance(figures, error)
     call check(.not. allocated(error), "a step is made")
-    call check_equal(figures%solve%iterations, 50, "none but the check after 4 iterations in the 40 before")
+    call check(figures%solve%iterations >= 24, "none but the check after 4 iterations in the 20 before")
     call check(sim%figure_ratio > 0.0_dp .and. sim%figure_ratio < 1.0e9_dp, "the ratio is that of this solve")
     call sim%free()
     call check_close(sim%figure_ratio, 0.0_dp, 0.0_dp, "another scene knows nothing of it")
   end subroutine test_ratio_of_a_run
+
+  !> A method starts anew where impulses have fallen so far that the roundings of the first are a tenth of the tolerance: to
+  !> 64 epsilon/(0.1 1e-2) of them. The count is that of the impulses of then.
+  subroutine test_fresh_start()
+    real(dp), parameter :: part = 64.0_dp*epsilon(1.0_dp)/1.0e-3_dp
+    type(simulation_t) :: sim
+    type(fresh_start_t) :: fresh
+    type(velocity_error_t) :: velocity
+    type(error_t), allocatable :: error
+    logical :: anew
+
+    call make_column(3, 2, "&solver method = 'nscdd' /", sim)
+    call velocity%start(sim%problem, 1.0_dp)
+    sim%problem%impulse_scale = 2.0_dp
+    call fresh%init(sim%problem, 1.0e-2_dp)
+    anew = .false.
+    sim%problem%impulse_scale = 2.01_dp*part
+    call fresh%renew(sim%problem, sim%method, velocity, 5, anew, error)
+    call check(.not. anew, "impulses that are not far below the first")
+    sim%problem%impulse_scale = 1.99_dp*part
+    call fresh%renew(sim%problem, sim%method, velocity, 6, anew, error)
+    call check(anew .and. .not. allocated(error), "impulses that are")
+    anew = .false.
+    call fresh%renew(sim%problem, sim%method, velocity, 7, anew, error)
+    call check(.not. anew, "and again only far below those of the start anew")
+    call sim%free()
+  end subroutine test_fresh_start
 
   !> Whether a schedule calls for a check after an iteration, with the goal 1e-3.
   logical function calls(schedule, problem, method, iteration)

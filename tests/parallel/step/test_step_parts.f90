@@ -13,6 +13,7 @@ program test_step_parts
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: count_rest
+  use gravier_borne_impulses, only: find_seen
   use gravier_waking, only: resting_t, watch_awake, wake_all
   use gravier_whole_problem, only: build_whole
   use gravier_supports, only: supports_t, find_supports
@@ -942,11 +943,23 @@ contains
   subroutine check_held()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
-    integer :: k
+    integer, allocatable :: seen(:)
+    integer :: k, s
 
     call make_chain(sim)
     do k = 1, 3
       call check_close(held(sim, k), g*h, solved, "contacts that are left out bear a disk")
+    end do
+    call sim%make_whole()
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s), view => sim%halo%view(s))
+        call find_seen(view%list, sub, seen)
+        do k = 1, sub%n_columns
+          if (seen(k) > 0) call check_equal(view%bodies%id(seen(k)), sub%id(k), "the grain behind a column")
+          call check((seen(k) > 0) .eqv. (k <= sub%n_grains), "grains have a place, and boundaries none")
+        end do
+        call check_close(max(0.0_dp, maxval(abs(sub%v_global(:, 1:sub%n_grains)))), 0.0_dp, 0.0_dp, "what sleeps has no velocity")
+      end associate
     end do
     do k = 1, 2
       call push(sim, 3, -0.02_dp)

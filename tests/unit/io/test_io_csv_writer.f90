@@ -7,6 +7,7 @@ program test_io_csv_writer
   use gravier_finite, only: is_finite
   use gravier_file_system, only: remove_file
   use gravier_csv_writer, only: csv_writer_t, csv_option_t
+  use gravier_text, only: to_text
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")
@@ -135,23 +136,23 @@ contains
     call put(head)
     call check_resumed(5, head, "a header alone")
     call put(rows)
-    call check_resumed(9, rows, "all rows")
+    call check_resumed(2, rows, "all rows")
     call put(rows//"3,7"//newline//"4,8"//newline)
     call check_resumed(2, rows, "rows of later steps")
-    call check_resumed(8, rows//"8,9"//newline, "resumed twice")
+    call check_resumed(3, rows//"3,9"//newline, "resumed twice")
     call put(rows//"3,7"//newline)
     call check_resumed(0, head, "no row to keep")
     call put(rows//"3,7")
-    call check_resumed(3, rows, "a torn last line")
+    call check_resumed(2, rows, "a torn last line")
     call put(rows//"3")
-    call check_resumed(3, rows, "a last line torn within the step")
+    call check_resumed(2, rows, "a last line torn within the step")
     call put(rows//newline)
     call table%resume(path, "step,x", 3, error)
     call expect(error, 'line 5: "", but the number of a step was expected', "an empty line", status_input)
     call check_equal(content(), rows//newline, "the file after a refusal")
   end subroutine test_resume
 
-  !> Resume, expect `kept`, and append a row.
+  !> Resume, expect `kept`, and append a row of the next step.
   subroutine check_resumed(last_step, kept, name)
     integer, intent(in) :: last_step
     character(len=*), intent(in) :: kept, name
@@ -166,10 +167,10 @@ contains
     call check_equal(len(content()), len(kept), name//": length")
     inquire (file=path//".part", exist=exists)
     call check(.not. exists, name//": no part is left")
-    call table%add(8)
+    call table%add(last_step + 1)
     call table%add(9)
     call table%end_row(error)
-    call check_equal(content(), kept//"8,9"//newline, name//": and a new row")
+    call check_equal(content(), kept//to_text(last_step + 1)//",9"//newline, name//": and a new row")
     call table%close(error)
     call check(.not. allocated(error), name//": no error at the end")
   end subroutine check_resumed
@@ -207,6 +208,20 @@ contains
     call table%resume(path, "step,x", 5, error)
     call expect(error, 'csv_writer.csv: line 3: "two", but the number of a step was expected', "a row without a step", status_input)
     call check(.not. table%is_open(), "not open after a refusal")
+    call put("step,x"//newline//"4,1"//newline//"5,1"//newline//"7,1"//newline)
+    call table%resume(path, "step,x", 7, error)
+    call expect(error, "csv_writer.csv: line 4: step 7, but rows of step 6 were expected", "a hole", status_input)
+    call table%resume(path, "step,x", 5, error)
+    call check(.not. allocated(error), "a hole behind what is kept")
+    call table%close(error)
+    call put("step,x"//newline//"4,1"//newline//"5,1"//newline)
+    call table%resume(path, "step,x", 6, error)
+    call expect(error, "csv_writer.csv: its last row is of step 5, but rows up to step 6 were expected; without this file a "// &
+      & "new table begins", "an end that is missing", status_input)
+    call table%resume(path, "step,x", 5, error)
+    call table%sync(error)
+    call check(.not. allocated(error), "a table that begins in a later step, brought to the disk")
+    call table%close(error)
     call put("step,x"//newline//"1,0*1"//newline)
     call table%resume(path, "step,x", 5, error)
     call expect(error, 'csv_writer.csv: line 2: "0*1", but a number was expected', "a cell that is no number", status_input)
