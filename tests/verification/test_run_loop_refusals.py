@@ -101,7 +101,7 @@ with gravier.Simulation(case, quiet=True) as s:
         else:
             raise AssertionError("not refused: " + statement)
     for name in ("weight", "position"):
-        for statement in (f"s.boundaries['floor'].{{name}} = 1.0", f"s.bodies.{{name}} = 1.0"):
+        for statement in (f"s.boundaries['floor'].{{name}} = 1.0", f"s.bodies.{{name}} = 1.0", f"s.{{name}} = 1.0"):
             try:
                 exec(statement)
             except AttributeError:

@@ -256,6 +256,9 @@ class Simulation:
     """A run that is open. `restart` goes on from the checkpoint of the case, `quiet` keeps the log off the terminal, `forces` gives bodies an
     array `force` [N]; `communicator` is one of mpi4py. All ranks of it make the same calls."""
 
+    # a name that is misspelt is refused
+    __slots__ = ("mark", "status", "dimension", "subdomains", "bodies", "boundaries", "_handle", "__weakref__")
+
     def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None):
         #: counts steps: arrays of bodies are of one of them
         self.mark = 0
