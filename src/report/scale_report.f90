@@ -72,7 +72,7 @@ contains
     type(scene_scales_t), intent(in) :: scales
     character(len=:), allocatable, intent(out) :: text
     integer, intent(out) :: number
-    !> velocity that solves may be wrong by [m/s]
+    !> velocity error that solves may leave to the mean grain [m/s]
     real(dp) :: error
     real(dp) :: g, a, most
 

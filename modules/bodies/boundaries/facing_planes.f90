@@ -17,7 +17,7 @@ contains
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: d
     real(dp), intent(out) :: low, high
-    !> planes that are removed in the run do not count; they do if absent
+    !> planes that are removed in the run do not count; without this argument they do
     logical, intent(in), optional :: stay
     integer :: b
 

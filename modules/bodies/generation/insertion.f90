@@ -181,7 +181,7 @@ contains
     behind = 0
     if (.not. self%rate < huge(1.0_dp) .or. self%is_complete()) return
     owed = min(self%rate*max(min(time, self%end) - self%start, 0.0_dp) + rounding, real(self%most_grains, dp))
-    ! the bound on the mass lets in about so many
+    ! the bound on the mass lets in about so many more
     if (self%most_mass < huge(1.0_dp)) owed = min(owed, self%entered + max(1.0_dp, (self%most_mass - self%mass)/self%mean_mass()))
     if (self%owes(self%entered, self%mass, 0.0_dp, time)) behind = int(owed, i8) - self%entered
   end function insertion_grains_behind
