@@ -424,7 +424,8 @@ contains
     schedule%trusted = 4
     schedule%settled = .true.
     call schedule%note_check(0, 1.0_dp, 1.0e-3_dp, is_known=.false.)
-    call set_progress(problem, 1.0e-4_dp)
+    ! by half of this, 50 times the goal is expected
+    call set_progress(problem, 1.0e-1_dp)
     call check(calls(schedule, problem, method, 4), "a settled scene is checked as soon as the estimate is trusted")
     call schedule%take_ratio(10.0_dp)
     call set_progress(problem, 1.4e-4_dp)
