@@ -1,13 +1,14 @@
 !> Reads an input file: Fortran namelist groups, of which every name and value is checked.
 module gravier_config
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
+  use gravier_number_text, only: is_integer, read_integer
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, scene_config_t, time_config_t, solver_config_t, decomposition_config_t, &
                                   enriched_config_t, output_config_t, boundary_config_t, sample_config_t, insertion_config_t, &
                                   material_config_t, law_config_t, region_config_t, given_coefficients_t
-  use gravier_config_key, only: kind_real
+  use gravier_config_key, only: kind_integer, kind_real
   use gravier_config_table, only: groups, keys, surface_rows, fill_keys
   use gravier_method_options, only: method_features_t, default_always, default_on_active
   use gravier_method_registry, only: features_of
@@ -252,6 +253,8 @@ contains
     associate (given => report%given(k, item%instance))
       if (failed .and. keys(k)%count == 1 .and. item%index /= "") then
         call raise(error, status_input, place//"expected "//item%key//" without an index")
+      else if (failed .and. keys(k)%kind == kind_integer .and. is_too_large(item%value)) then
+        call raise(error, status_input, place//"expected "//expected_text(keys(k))//", at most "//to_text(huge(1)))
       else if (failed) then
         call raise(error, status_input, place//"expected "//expected_text(keys(k)))
       else if (any(given%entries .and. touched)) then
@@ -264,6 +267,16 @@ contains
     end associate
     if (associated(slot%given)) slot%given = .true.
   end subroutine read_assignment
+
+  !> Whether a text is an integer that no key can have.
+  pure logical function is_too_large(text)
+    character(len=*), intent(in) :: text
+    integer(i8) :: value
+    logical :: fits
+
+    call read_integer(text, value, fits)
+    is_too_large = is_integer(text) .and. (.not. fits .or. abs(value) > huge(1))
+  end function is_too_large
 
   !> Fails on a group that belongs to other bodies, and on a missing group that the bodies ask for.
   subroutine check_owned_groups(config, found, error)

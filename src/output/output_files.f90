@@ -1,31 +1,36 @@
-!> The files that a run has in its output directory, before it begins: none of them may be one that it reads, and those of an older
-!> run that it does not replace are named in the log.
+!> The files that a run has in its output directory, before it begins: it must be able to write them, none of them may be one that
+!> it reads, and those of an older run that it does not replace are named in the log.
 module gravier_output_files
   use gravier_errors, only: error_t, raise, status_input
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: place_of, place_t
+  use gravier_file_system, only: place_of, place_t, check_directory, is_directory
   use gravier_config_types, only: config_t
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
   private
-  public :: check_inputs, older_files
+  public :: check_paths, refuse_directory, older_files
 
   !> of every run
   character(len=*), parameter :: log_name = "run.log"
 
 contains
 
-  !> Refuse an input that the run would replace by an output. Rank 0 looks. Failure: status_input, with the key. Collective.
-  subroutine check_inputs(comm, config, error)
+  !> Refuse an output directory that cannot be written to, an output whose place a directory has, and an input that the run would
+  !> replace by an output. Rank 0 looks and writes nothing. Failure: status_input, with the key. Collective.
+  subroutine check_paths(comm, config, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: reason
     character(len=:), allocatable :: names
     integer :: b
 
     if (allocated(error)) return
     if (comm%rank == 0) then
+      call check_directory(trim(config%output%directory), reason)
+      if (allocated(reason)) call refuse_directory(config, reason, error)
       names = file_names(config, wanted=.true.)
+      call check_outputs(config, names, error)
       call check_input(config%file, "the case itself")
       if (config%scene%bodies == "file") call check_input(config%scene%bodies_file, "&scene bodies_file")
       call check_input(config%scene%shapes, "&scene shapes")
@@ -60,7 +65,36 @@ contains
       end do
     end subroutine check_input
 
-  end subroutine check_inputs
+  end subroutine check_paths
+
+  !> The message of an output directory that a run cannot have.
+  subroutine refuse_directory(config, reason, error)
+    type(config_t), intent(in) :: config
+    !> what the system says
+    type(error_t), intent(in) :: reason
+    type(error_t), allocatable, intent(inout) :: error
+
+    call raise(error, status_input, config%file//": &output directory = '"//trim(config%output%directory)// &
+      & "': expected a directory that can be written to: "//reason%message)
+  end subroutine refuse_directory
+
+  !> Refuse outputs whose place a directory has. Not collective.
+  subroutine check_outputs(config, names, error)
+    type(config_t), intent(in) :: config
+    !> of the files, with commas between
+    character(len=*), intent(in) :: names
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: first, last
+
+    first = 1
+    do while (first <= len(names) .and. .not. allocated(error))
+      last = first + index(names(first:)//",", ",") - 2
+      if (is_directory(trim(config%output%directory)//"/"//names(first:last))) call raise(error, status_input, config%file// &
+        & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//names(first:last)// &
+        & ", as a file of this run; expected another name for one of them")
+      first = last + 2
+    end do
+  end subroutine check_outputs
 
   !> Names of files that an older run has left in the output directory and that this one does not replace, with commas between.
   function older_files(config) result(found)

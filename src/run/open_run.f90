@@ -25,7 +25,7 @@ module gravier_open_run
   use gravier_accuracy_lines, only: goal_name
   use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
-  use gravier_output_files, only: check_inputs, older_files
+  use gravier_output_files, only: check_paths, refuse_directory, older_files
   use gravier_run_end, only: has_ended, end_line
   implicit none
   private
@@ -97,7 +97,7 @@ contains
     call reset_timers()
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
-    call check_inputs(comm, config, error)
+    call check_paths(comm, config, error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
@@ -313,8 +313,7 @@ contains
     if (allocated(error)) return
     if (comm%rank == 0) then
       call make_directory(trim(config%output%directory), reason)
-      if (allocated(reason)) call raise(error, status_input, config%file//": &output directory = '"// &
-        & trim(config%output%directory)//"': expected a directory that can be written to: "//reason%message)
+      if (allocated(reason)) call refuse_directory(config, reason, error)
     end if
     call comm%agree(error)
     call lock%take_directory(comm, trim(config%output%directory), command, error)

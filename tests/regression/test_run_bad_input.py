@@ -82,7 +82,7 @@ FILES = [
     key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),
     key("time", "step", "1e-3 s", "expected a finite real number > 0 (s)"),
     key("time", "steps", "1.5", "expected an integer >= 0"),
-    key("time", "steps", "99999999999", "expected an integer >= 0"),
+    key("time", "steps", "99999999999", "expected an integer >= 0, at most 2147483647"),
     key("solver", "warm_start", "maybe", "expected"),
     key("solver", "sweeps", ".true.", "expected an integer >= 1"),
     key("scene", "title", "5", "expected"),
@@ -546,6 +546,25 @@ class BadInput(RunTestCase):
             return "case.nml"
         self.refuse_all([(path, path, ("&output directory", f"'{path}'", "expected a directory that can be written to"))
                          for path in ("file", "file/below", "/proc/nowhere", "/proc/self")], prepare_output)
+        # a check makes no directory, and finds what permissions tell
+        for path in ("file", "file/below/that"):
+            with self.subTest(path, check=True):
+                directory = self.here("check-" + path.replace("/", "-"))
+                os.makedirs(directory)
+                name = prepare_output(directory, path)
+                before = snapshot(directory)
+                self.assert_refused(gravier("--check", name, directory=directory),
+                                    ("&output directory", f"'{path}'", "nothing can be written there: Not a directory"))
+                self.assertEqual(snapshot(directory), before)
+
+    def test_directories_in_the_place_of_outputs(self):
+        def prepare_directory(directory, name, output):
+            os.makedirs(os.path.join(directory, "out", name))
+            write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"output": {"directory": "out", **output}})))
+            return "case.nml"
+        self.refuse_all([(name, name, output, ("&output directory = 'out'", f"a directory in it is called {name},"))
+                         for name, output in (("run.log", {}), ("history.csv", {}), ("results.h5", {}),
+                                              ("final_bodies.h5", {"final_bodies": True}))], prepare_directory)
 
     def test_inputs_that_the_run_would_replace(self):
         def prepare_input_among_outputs(directory, name, groups):

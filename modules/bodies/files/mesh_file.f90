@@ -84,14 +84,16 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(csv_table_t) :: table
     real(dp), allocatable :: longer(:, :)
-    integer :: n, k, column(2)
+    integer :: n, k, column(3)
     logical :: found
 
     call table%open(path, error)
     if (allocated(error)) return
     column(1) = table%column("x")
     column(2) = table%column("y")
-    if (any(column == 0)) call table%refuse_file("columns x and y were expected", error)
+    ! a table that has it is one of points of a plane where it is 0 everywhere
+    column(3) = table%column("z")
+    if (any(column(1:2) == 0)) call table%refuse_file("columns x and y were expected", error)
     allocate (point(3, 16), source=0.0_dp)
     n = 0
     do
@@ -103,8 +105,8 @@ contains
         call move_alloc(longer, point)
       end if
       n = n + 1
-      do k = 1, 2
-        call table%get_real(column(k), point(k, n), error)
+      do k = 1, 3
+        if (column(k) > 0) call table%get_real(column(k), point(k, n), error)
       end do
     end do
     call table%close()

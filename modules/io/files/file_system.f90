@@ -1,5 +1,5 @@
-!> What Fortran leaves to the operating system: directories, atomic renames, where paths lead, reserved disk space, and
-!> whether the standard output is a terminal.
+!> What Fortran leaves to the operating system: directories, atomic renames, where paths lead, and whether the standard output is
+!> a terminal.
 module gravier_file_system
   use, intrinsic :: iso_c_binding, only: c_int, c_short, c_int64_t, c_size_t, c_char, c_ptr, c_null_char, c_null_ptr, &
     & c_f_pointer, c_loc
@@ -7,16 +7,15 @@ module gravier_file_system
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
-  use gravier_system_calls, only: ask_window_size, c_window_size, c_close, c_creat, c_fallocate, c_fstatvfs, c_fsync, &
-    & c_ftruncate, c_getpid, c_gethostname, &
-    & c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, c_readlink, c_rename, c_rmdir, c_statx, c_unlink, c_write, c_text, &
-    & text_at, last_error, reason, o_rdonly, o_wronly, o_nonblock, file_mode, directory_mode, falloc_fl_keep_size, &
-    & falloc_fl_punch_hole, seek_end, at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word, &
-    & eintr, eexist, enodev, espipe, enospc, enosys, eopnotsupp, statvfs_words, glob_words
+  use gravier_system_calls, only: ask_window_size, file_is_there, file_is_writable, c_window_size, c_access, c_close, &
+    & c_creat, c_fallocate, c_fsync, c_getpid, c_gethostname, c_glob, c_globfree, c_isatty, c_lseek, c_mkdir, c_open, &
+    & c_readlink, c_rename, c_rmdir, c_statx, c_unlink, c_write, c_text, text_at, last_error, reason, o_rdonly, o_wronly, &
+    & o_nonblock, file_mode, directory_mode, falloc_fl_keep_size, falloc_fl_punch_hole, seek_end, at_fdcwd, at_empty_path, &
+    & statx_ino, statx_words, statx_inode_word, statx_device_word, eexist, enodev, espipe, glob_words
   implicit none
   private
-  public :: make_directory, remove_directory, rename_file, remove_file, check_readable, check_creatable, reserve_space, file_length
-  public :: extend_file, replace_file, terminal_width, host_name
+  public :: make_directory, check_directory, is_directory, remove_directory, rename_file, remove_file, check_readable
+  public :: check_creatable, file_length, replace_file, terminal_width, host_name
   public :: path_t, add_path, list_files
   public :: place_t, place_of, place_of_open, is_device
 
@@ -65,6 +64,34 @@ contains
     end if
     call probe_directory(trim(path), error)
   end subroutine make_directory
+
+  !> Check that `make_directory` can make a directory, or find it, as far as permissions tell without a write. Failure:
+  !> status_failure, with the system's reason. Not collective: call on one rank.
+  subroutine check_directory(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: nearest
+    integer :: last
+
+    if (allocated(error)) return
+    ! up to the nearest name that is there
+    nearest = trim(path)
+    do while (nearest /= "")
+      if (c_access(c_text(nearest), file_is_there) == 0) exit
+      last = index(nearest, "/", back=.true.)
+      nearest = nearest(:last - 1)
+      if (last == 1) nearest = "/"
+    end do
+    if (nearest == "") nearest = "."
+    if (c_access(c_text(nearest//"/."), file_is_writable) /= 0) call raise(error, status_failure, nearest// &
+      & ": nothing can be written there: "//reason(last_error()))
+  end subroutine check_directory
+
+  !> Whether a directory is there.
+  logical function is_directory(path)
+    character(len=*), intent(in) :: path
+    is_directory = c_access(c_text(path//"/."), file_is_there) == 0
+  end function is_directory
 
   !> Make one directory; the result is the system's error number, 0 for success.
   integer(c_int) function make_one(path) result(number)
@@ -234,43 +261,6 @@ contains
     name = trim(buffer(1:index(buffer//c_null_char, c_null_char) - 1))
   end function host_name
 
-  !> Reserve disk space beyond the end of a file, leaving its length as it is, so that writing it later cannot fail
-  !> for want of space. Where the file system knows no reservation, only compare with the space that is free now.
-  !> Failure: status_failure; the file is as it was, and so is what was reserved before.
-  subroutine reserve_space(path, bytes, error, start, held)
-    character(len=*), intent(in) :: path
-    integer(i8), intent(in) :: bytes
-    type(error_t), allocatable, intent(inout) :: error
-    !> also reserve what is missing between this place (from 0) and the end
-    integer(i8), intent(in), optional :: start
-    !> up to this place space was reserved before
-    integer(i8), intent(in), optional :: held
-    integer(c_int) :: descriptor, number, ignored
-    integer(c_int64_t) :: length, first
-
-    if (allocated(error) .or. bytes <= 0) return
-    descriptor = c_open(c_text(path), o_wronly, 0_c_int)
-    if (descriptor < 0) then
-      call raise(error, status_failure, path//": cannot write to this file: "//reason(last_error()))
-      return
-    end if
-    length = c_lseek(descriptor, 0_c_int64_t, seek_end)
-    first = length
-    if (present(start)) first = min(first, int(start, c_int64_t))
-    number = allocate_range(descriptor, first, length + bytes)
-    if (number == enosys .or. number == eopnotsupp) number = compare_with_free(descriptor, bytes)
-    if (number /= 0) then
-      ! some file systems keep the part that did fit: give it back
-      ignored = c_ftruncate(descriptor, length)
-      if (present(held)) then
-        if (held > length) ignored = allocate_range(descriptor, length, int(held, c_int64_t))
-      end if
-      call raise(error, status_failure, path//": "//reason(number)//": "//to_text(bytes)// &
-        & " bytes needed; what was written before stays readable")
-    end if
-    ignored = c_close(descriptor)
-  end subroutine reserve_space
-
   !> Columns of the terminal on which a person looks at the standard output of this process, 0 where nobody does. Open MPI gives a
   !> rank a pseudo terminal whatever its own output is: where it has started the process, the first process above that writes
   !> elsewhere is asked, the launcher. Where the terminal does not say, 80.
@@ -352,27 +342,6 @@ contains
     ignored = c_close(descriptor)
   end function file_length
 
-  !> Give a file at least `length` bytes, zeros behind its end. Failure: status_failure, with the system's reason.
-  subroutine extend_file(path, length, error)
-    character(len=*), intent(in) :: path
-    integer(i8), intent(in) :: length
-    type(error_t), allocatable, intent(inout) :: error
-    integer(c_int) :: descriptor, number, ignored
-
-    if (allocated(error)) return
-    number = 0
-    descriptor = c_open(c_text(path), o_wronly, 0_c_int)
-    if (descriptor < 0) then
-      number = last_error()
-    else
-      if (c_lseek(descriptor, 0_c_int64_t, seek_end) < length) then
-        if (c_ftruncate(descriptor, int(length, c_int64_t)) /= 0) number = last_error()
-      end if
-      ignored = c_close(descriptor)
-    end if
-    if (number /= 0) call raise(error, status_failure, path//": cannot write to this file: "//reason(number))
-  end subroutine extend_file
-
   !> Put a finished file in the place of another in one indivisible operation, once its content is on the disk: whatever
   !> happens, a loss of power included, `to` is the older file or the new one whole. Failure: status_failure, with the
   !> system's reason; `to` is as it was.
@@ -410,30 +379,6 @@ contains
     if (c_fsync(descriptor) /= 0) number = last_error()
     ignored = c_close(descriptor)
   end function sync_to_disk
-
-  !> Reserve bytes [first, last) of an open file; the result is the system's error number, 0 for success.
-  integer(c_int) function allocate_range(descriptor, first, last) result(number)
-    integer(c_int), intent(in) :: descriptor
-    integer(c_int64_t), intent(in) :: first, last
-
-    do
-      number = 0
-      if (c_fallocate(descriptor, falloc_fl_keep_size, first, last - first) /= 0) number = last_error()
-      if (number /= eintr) return
-    end do
-  end function allocate_range
-
-  !> ENOSPC when the file system of an open file has less free space than `bytes`, else 0.
-  integer(c_int) function compare_with_free(descriptor, bytes) result(number)
-    integer(c_int), intent(in) :: descriptor
-    integer(i8), intent(in) :: bytes
-    integer(c_int64_t) :: status(statvfs_words)
-
-    number = 0
-    if (c_fstatvfs(descriptor, status) /= 0) return
-    ! words of struct statvfs: 2 is the size of a block, 5 the number of blocks free to this user
-    if (status(5) < bytes/max(status(2), 1_c_int64_t) + 1) number = enospc
-  end function compare_with_free
 
   !> Add the paths of the files in a directory whose names end with `suffix`, in the order of their bytes.
   subroutine list_files(directory, suffix, paths)

@@ -4,12 +4,13 @@ module gravier_system_calls
     & c_f_pointer, c_associated
   implicit none
   private
-  public :: c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
+  public :: c_access, c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
   public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink, c_errno_location, c_strerror
   public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_window_size
   public :: ask_window_size, o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
   public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, glob_words
   public :: at_fdcwd, at_empty_path, statx_ino, statx_words, statx_inode_word, statx_device_word
+  public :: file_is_there, file_is_writable
   public :: eintr, eacces, eagain, eexist, enodev, enospc, espipe, enolck, enosys, eopnotsupp
   public :: range_lock_t, set_lock, lock_shared, lock_exclusive
   public :: c_text, text_at, last_error, reason
@@ -28,6 +29,8 @@ module gravier_system_calls
   integer(c_long), parameter :: ask_window_size = int(z"5413", c_long)
   !> of statx: paths from the working directory on, or none and an open file; what is asked for
   integer(c_int), parameter :: at_fdcwd = -100, at_empty_path = int(z"1000", c_int), statx_ino = 256
+  !> of access
+  integer(c_int), parameter :: file_is_there = 0, file_is_writable = 2
   !> more than the length of struct statx, on every processor the same, and its words of the inode and of the device
   integer, parameter :: statx_words = 64, statx_inode_word = 5, statx_device_word = 18
   !> more than the length of struct statvfs
@@ -59,6 +62,13 @@ module gravier_system_calls
       implicit none
       character(kind=c_char), intent(in) :: from(*), to(*)
     end function c_rename
+
+    integer(c_int) function c_access(path, mode) bind(C, name="access")
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: path(*)
+      integer(c_int), value :: mode
+    end function c_access
 
     integer(c_int) function c_unlink(path) bind(C, name="unlink")
       import :: c_int, c_char

@@ -11,7 +11,8 @@ module gravier_hdf5_storage
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: check_readable, check_creatable, reserve_space, file_length, extend_file, remove_file, replace_file
+  use gravier_disk_space, only: reserve_space, extend_file
+  use gravier_file_system, only: check_readable, check_creatable, file_length, remove_file, replace_file
   use gravier_own_files, only: part_of, give_name, note_own
   use gravier_hdf5_properties, only: start_library, parallel_access, ask_for_one_block
   implicit none

@@ -616,7 +616,7 @@ contains
     call refuse(scene("bodies = 'column' column_count = 2.5"), "&scene column_count = 2.5: expected an integer >= 1")
     call refuse(scene("bodies = 'column' column_count = 'a'"), "&scene column_count = 'a': expected an integer >= 1")
     call refuse(scene("bodies = 'column' column_count = 99999999999"), &
-      "&scene column_count = 99999999999: expected an integer >= 1")
+      "&scene column_count = 99999999999: expected an integer >= 1, at most 2147483647")
     call refuse(column // "&output trace = yes /", "&output trace = yes: expected .true. or .false.")
     call refuse(column // "&output trace = tomato /", "&output trace = tomato: expected .true. or .false.")
     call refuse(column // "&output trace = 1 /", "&output trace = 1: expected .true. or .false.")

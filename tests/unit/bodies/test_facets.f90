@@ -384,6 +384,7 @@ contains
     call refuse("a.csv", "x,y"//n//"0,0"//n, 2, "two points or more were expected")
     call refuse("b.csv", "x,z"//n//"0,0"//n, 2, "columns x and y")
     call refuse("c.csv", "x,y"//n//"0,0"//n//"1e40,0"//n, 2, "1e30")
+    call refuse("g.csv", "x,y,z"//n//"0,0,0"//n//"1,0,0.5"//n, 2, "point 2: z = 5.00000000E-01: expected 0 in 2D")
     call refuse("d.obj", points//"l 1 2 3", 2, ": expected 0 in 2D")
     call refuse("e.obj", points//"f 1 2 3", 2, "e.obj: no line through points, ""l i j"", was found")
     call refuse("f.obj", points//"l 1", 2, "a line of 1 corners, but 2")

@@ -4,8 +4,10 @@ program test_io_file_system
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, status_input, status_failure
-  use gravier_file_system, only: make_directory, remove_directory, rename_file, replace_file, remove_file, check_readable, &
-    & check_creatable, reserve_space, extend_file, is_device, place_t, place_of, place_of_open
+  use gravier_file_system, only: make_directory, check_directory, is_directory, remove_directory, rename_file, &
+    & replace_file, remove_file, check_readable, check_creatable, is_device, place_t, place_of, &
+    & place_of_open
+  use gravier_disk_space, only: reserve_space, extend_file
   use gravier_system_calls, only: c_open, c_close, c_text, o_rdonly
   use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files, forget_own_files
   use gravier_text_file, only: text_file_t
@@ -131,6 +133,22 @@ contains
     call expect(error, status_failure, here//"/a/d/file", "a file where a directory should be")
     call make_directory(here//"/a/d/file/e", error)
     call expect(error, status_failure, "Not a directory", "a directory below a file")
+    call check(is_directory(here//"/a/d"), "a directory")
+    call check(.not. is_directory(here//"/a/d/file"), "a file is no directory")
+    call check(.not. is_directory(here//"/a/none"), "what is not there is no directory")
+    call check_directory(here//"/a/d", error)
+    call expect_none(error, "a directory that could be made, and is there")
+    call check_directory(here//"/a/none/below", error)
+    call expect_none(error, "directories that could be made")
+    call check(.not. is_directory(here//"/a/none"), "none of them is made")
+    call check_directory("none/below", error)
+    call expect_none(error, "directories that could be made here")
+    call check_directory("", error)
+    call expect_none(error, "the directory of work")
+    call check_directory(here//"/a/d/file", error)
+    call expect(error, status_failure, here//"/a/d/file: nothing can be written there: Not a directory", "a file")
+    call check_directory(here//"/a/d/file/e", error)
+    call expect(error, status_failure, here//"/a/d/file: nothing can be written there: Not a directory", "below a file")
     call make_directory("/proc/gravier", error)
     call expect(error, status_failure, "/proc/gravier: cannot make this directory", "a directory that may not be made")
     call make_directory("/proc/self", error)
