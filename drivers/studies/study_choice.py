@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """Step and accuracy of five small scenes: what a user would publish, its error, and what it costs.
 
-    ./gravier study choice [--out DIR]                     some 15 minutes on two busy cores; GRAVIER_BIN_DIR says where gravier is
+    ./gravier study choice [--out DIR]                     some ten minutes on two cores; GRAVIER_BIN_DIR says where gravier is
     ./gravier study choice [--out DIR] --only shear drum   these alone
-    ./gravier study choice [--out DIR] --quick             settling and biaxial alone, without the smallest step
+    ./gravier study choice [--out DIR] --quick             settling and biaxial alone, without the smallest step, four runs of each setting
 
-leaves in DIR study_choice.csv, a row for each quantity of each run, and prints the tables of doc/choosing.md. Each scene is one of data/ with a shorter
-time or with fewer grains. Further runs with the second step and 0.1, and with the smallest step and 0.03, begin from places of the grains that
-differ by a millionth of a diameter (the lattice of the settling: from other radii). The mean of those with the smallest step is the reference;
-twice the standard deviation in either group, the root mean square of both, is the scatter. A value is right where it deviates by no more than 2 %, or than the scatter where that is larger. Seconds are processor seconds of a run on
-one rank; cost is seconds over those of the cheapest run that is right. The closing table has the deviations of the default accuracy
-and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
+leaves in DIR study_choice.csv, a row for each quantity of each setting, and prints the tables of doc/choosing.md. Each scene is one of data/ with a
+shorter time or with fewer grains. Each setting, a step and an accuracy, has several runs, which begin from places of the grains that differ by
+a millionth of a diameter (the lattice of the settling: from other radii). Values are means. The reference is that of the smallest step and
+tightest accuracy; a deviation is uncertain by twice its standard error, of both means. A value is right where it deviates by no more than 2 %, or than that
+where it is larger. Seconds are processor seconds of a run on one rank; cost is seconds over those of the cheapest setting that is right. The
+closing table has the deviations of the default accuracy and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is
+missed."""
 import argparse
 import resource
 import sys
@@ -25,8 +26,8 @@ from study_support import BINARIES, SOURCE, gravier, read_history, sized, states
 
 ACCURACIES = (0.3, 0.1, 0.03)
 RIGHT = 0.02  # deviation that counts as none
-#: a scatter that is found from four runs is uncertain by so much of itself
-UNCERTAIN = 0.5
+#: standard errors by which a deviation is uncertain, and by which one of forty may deviate
+UNCERTAIN, FAR = 2.0, 3.0
 #: solves that may miss the default accuracy
 MISSED = 0.0025
 SHIFT = 1.0e-6  # of a realisation, in mean diameters
@@ -137,55 +138,54 @@ def run_one(job):
     return found
 
 
-def repeated(name):
-    """Step and accuracy of the runs that are made several times; those of the reference come last."""
-    return (SCENES[name].steps[1], 0.1), (SCENES[name].steps[-1], ACCURACIES[-1])
-
-
 def jobs_of(options):
     """All runs, the long ones first."""
-    jobs = [(name, step, accuracy, 0) for name in options.only for step in SCENES[name].steps for accuracy in ACCURACIES]
-    jobs += [(name, *kind, k) for name in options.only for kind in repeated(name) for k in range(1, options.realisations + 1)]
+    jobs = [(name, step, accuracy, k) for name in options.only for step in SCENES[name].steps for accuracy in ACCURACIES
+            for k in range(options.realisations)]
     return [(options.out, options.measure, *job) for job in sorted(jobs, key=lambda job: job[1] * job[2])]
 
 
 def compare(runs):
-    """Rows of the table of one scene: each quantity of each run against the reference."""
-    main = sorted((one for one in runs if one.realisation == 0), key=lambda one: (-one.step, -one.accuracy))
-    rows, right = [], {}
-    for quantity in main[0].values:
-        again = [[one.values[quantity] for one in runs if (one.step, one.accuracy) == kind] for kind in repeated(main[0].name)]
-        reference = np.mean(again[-1])
-        scatter = 2.0 * np.sqrt(np.mean([np.var(values, ddof=1) if len(values) > 1 else 0.0 for values in again])) / abs(reference)
-        for one in main:
-            deviation = one.values[quantity] / reference - 1.0
-            is_right = abs(deviation) <= max(RIGHT, scatter)
-            right[id(one)] = right.get(id(one), True) and is_right
-            rows.append([one, quantity, deviation, scatter, is_right])
-    cheapest = min(one.seconds for one in main if right[id(one)])
-    return [{"scene": one.name, "step": one.step, "accuracy": one.accuracy, "quantity": quantity, "value": float(one.values[quantity]),
-             "deviation": float(deviation), "scatter": float(scatter), "right": int(is_right), "missed": float(one.missed),
-             "iterations": int(one.iterations), "seconds": float(one.seconds), "cost": float(one.seconds / cheapest)}
-            for one, quantity, deviation, scatter, is_right in rows]
+    """Rows of the table of one scene: each quantity of each setting against the reference."""
+    settings = {}
+    for one in runs:
+        settings.setdefault((one.step, one.accuracy), []).append(one)
+    rows = []
+    for quantity in runs[0].values:
+        values = {key: np.array([one.values[quantity] for one in several]) for key, several in settings.items()}
+        mean = {key: found.mean() for key, found in values.items()}
+        variance = {key: found.var(ddof=1) / len(found) for key, found in values.items()}
+        reference = min(settings)
+        for key, several in settings.items():
+            deviation = mean[key] / mean[reference] - 1.0
+            error = np.sqrt(variance[key] + (variance[reference] if key != reference else 0.0)) / abs(mean[reference])
+            rows.append({"scene": several[0].name, "step": key[0], "accuracy": key[1], "runs": len(several), "quantity": quantity,
+                         "value": float(mean[key]), "deviation": float(deviation), "standard_error": float(error),
+                         "right": int(abs(deviation) <= max(RIGHT, UNCERTAIN * error)),
+                         "missed": float(np.mean([one.missed for one in several])),
+                         "iterations": float(np.mean([one.iterations for one in several])),
+                         "seconds": float(np.mean([one.seconds for one in several]))})
+    wrong = {(row["step"], row["accuracy"]) for row in rows if not row["right"]}
+    cheapest = min(row["seconds"] for row in rows if (row["step"], row["accuracy"]) not in wrong)
+    return [{**row, "cost": row["seconds"] / cheapest} for row in rows]
 
 
 def print_table(rows):
-    """Of all scenes, a line a run."""
-    print("\n| scene | step [ms] | accuracy | value | deviation [%] | scatter [%] | solves that missed [%] | seconds | cost |")
-    print("|---|---:|---:|---|---:|---:|---:|---:|---:|")
-    runs = {}
+    """Of all scenes, a line a setting."""
+    print("\n| scene | step [ms] | accuracy | value | deviation [%] | solves that missed [%] | seconds | cost |")
+    print("|---|---:|---:|---|---:|---:|---:|---:|")
+    settings = {}
     for row in rows:
-        runs.setdefault((row["scene"], row["step"], row["accuracy"]), []).append(row)
-    for (name, step, accuracy), several in sorted(runs.items(), key=lambda one: (list(SCENES).index(one[0][0]), -one[0][1], -one[0][2])):
+        settings.setdefault((row["scene"], row["step"], row["accuracy"]), []).append(row)
+    for (name, step, accuracy), several in sorted(settings.items(), key=lambda one: (list(SCENES).index(one[0][0]), -one[0][1], -one[0][2])):
         values = ", ".join(f"{row['quantity']} {row['value']:.4g}" for row in several)
-        deviations = ", ".join(f"{100.0 * row['deviation']:+.1f}" for row in several)
-        scatters = ", ".join(f"{100.0 * row['scatter']:.1f}" for row in several)
-        print(f"| {name} | {1e3 * step:g} | {accuracy:g} | {values} | {deviations} | {scatters} | {100.0 * several[0]['missed']:.1f} | "
+        deviations = ", ".join(f"{100.0 * row['deviation']:+.1f} ± {100.0 * UNCERTAIN * row['standard_error']:.1f}" for row in several)
+        print(f"| {name} | {1e3 * step:g} | {accuracy:g} | {values} | {deviations} | {100.0 * several[0]['missed']:.2f} | "
               f"{several[0]['seconds']:.1f} | {several[0]['cost']:.2g} |")
 
 
 def accepted(rows):
-    """The closing table. Runs with an accuracy of 0.3 are shown alone: the page says that a discharge deviates there by more."""
+    """The closing table. Settings with an accuracy of 0.3 are shown alone: the page says how they deviate."""
     page = "doc/choosing.md, Measured"
     table = Bounds()
     for row in rows:
@@ -193,10 +193,9 @@ def accepted(rows):
             continue
         case = f"{row['scene']}, step {1e3 * row['step']:g} ms, accuracy {row['accuracy']:g}"
         table.near(f"{case}: deviation of {row['quantity']} [%]", 100.0 * row["deviation"], 0.0,
-                   100.0 * max(RIGHT, (1.0 + UNCERTAIN) * row["scatter"]),
-                   f"{page}: 2 %, or the scatter, which is uncertain by a half")
+                   100.0 * max(RIGHT, FAR * row["standard_error"]), f"{page}: 2 %, or three standard errors")
     for name in dict.fromkeys(row["scene"] for row in rows):
-        table.add(f"{name}: share of the solves that missed, the most of all runs [%]", 100.0 * max(row["missed"] for row in rows if
+        table.add(f"{name}: share of the solves that missed, the most of all settings [%]", 100.0 * max(row["missed"] for row in rows if
                   row["scene"] == name), None, 100.0 * MISSED, f"{page}: up to 0.25")
     return table.close()
 
@@ -206,10 +205,12 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/choice"), help="default: out/choice")
     parser.add_argument("--quick", action="store_true", help="settling and biaxial alone, without the smallest step")
     parser.add_argument("--only", nargs="+", choices=list(SCENES), metavar="SCENE", help="scenes to run")
-    parser.add_argument("--realisations", type=int, default=3, help="further runs of each scene, for the scatter")
+    parser.add_argument("--realisations", type=int, help="runs of each setting, 2 or more (8; 4 with --quick)")
     parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
-    options = sized(parser.parse_args(), {"only": list(SCENES)}, {"only": ["settling", "biaxial"]})
+    options = sized(parser.parse_args(), {"only": list(SCENES), "realisations": 8}, {"only": ["settling", "biaxial"], "realisations": 4})
+    if options.realisations < 2:
+        parser.error(f"--realisations {options.realisations}: expected 2 or more")
     options.out.mkdir(parents=True, exist_ok=True)
     if options.quick:
         for scene in SCENES.values():

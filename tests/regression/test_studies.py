@@ -176,8 +176,8 @@ class ClosingTable(unittest.TestCase):
 
     def test_choice(self):
         def judge(given):
-            return study_choice.accepted([{"scene": "settling", "step": 1e-3, "accuracy": 0.1, "quantity": "q", "scatter": 0.03,
-                                           **given}])
+            return study_choice.accepted([{"scene": "settling", "step": 1e-3, "accuracy": 0.1, "quantity": "q",
+                                           "standard_error": 0.015, **given}])
         self.breaks(judge, {"deviation": 0.04, "missed": 0.0}, {"deviation": 0.05, "missed": 0.01})
 
     def test_convergence(self):
