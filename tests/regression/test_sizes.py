@@ -1,12 +1,12 @@
 """Files and procedures stay short enough to be read: at most 500 lines a file, 80 lines a procedure with those within it, unless its comment
-says why it `is long`, and seven arguments."""
+says why it `is long`, and seven arguments; lines have at most 132 characters, comments too."""
 import os
 import re
 import unittest
 from pathlib import Path
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
-FILE, PROCEDURE, ARGUMENTS = 500, 80, 7
+FILE, PROCEDURE, ARGUMENTS, LINE = 500, 80, 7, 132
 #: kernels take packed arrays and numbers one by one, so that the compiler sees that these do not overlap
 KERNELS = ("modules/solver/kernels/", "modules/contact/local/find_frame.fypi")
 BEGIN = re.compile(r"^\s*(?!end\b)(?:[\w()=, ]+\s)?(?:subroutine|function)\s+([\w${}]+)\s*(\([^)]*\)?)?")
@@ -59,6 +59,14 @@ class Sizes(unittest.TestCase):
         found = [f"{path.relative_to(SOURCE)}: {count}" for path in sources()
                  if (count := len(path.read_text(encoding="utf-8").splitlines())) > FILE]
         self.assertEqual(found, [], f"more than {FILE} lines")
+
+    def test_lines(self):
+        """Compilers pass over comments that are too long; lines that fypp expands are not those that compilers read."""
+        sources_and_tests = [path for path in [*sources(), *sorted(Path(SOURCE, "tests").rglob("*.f90"))] if path.suffix == ".f90"]
+        found = [f"{path.relative_to(SOURCE)}:{number}: {len(line)} characters" for path in sources_and_tests
+                 for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if len(line) > LINE]
+        self.assertGreater(len(sources_and_tests), 400)
+        self.assertEqual(found, [], f"more than {LINE} characters")
 
     def test_procedures(self):
         long, many, total = [], [], 0

@@ -36,8 +36,8 @@ module gravier_contact_law
     real(dp) :: gap = 0.0_dp
     !> geometric mean of the radii of two grains, the radius of a grain at a boundary [m]
     real(dp) :: radius = 0.0_dp
-    !> of a law that sees it: relative velocity at the start of the step, along the normal, > 0 where the bodies part, and size of the
-    !> tangential one [m/s]
+    !> of a law that sees it: relative velocity at the start of the step, along the normal, > 0 where the bodies part, and size of
+    !> the tangential one [m/s]
     real(dp) :: normal_velocity = 0.0_dp, slip = 0.0_dp
     !> where some law has springs: step [s]; radius and mass of one sphere that meets a plane as the two bodies meet each other
     !> [m, kg]; what a pressure is multiplied with to be a force over a length, 2 `radius`, 1 in 2D [m, 1]

@@ -13,8 +13,8 @@ module gravier_pass_backoff
   character(len=*), parameter :: pass_backoff_record = "given_up next_step"
   !> So many passes may be given up one after the other without a pause, because a scene that settles keeps one pass in several.
   integer, parameter :: patience = 4
-  !> The next pass that is given up is followed by `first_pause` steps without a pass. Each further one is followed by twice as many,
-  !> and by `longest_pause` at most.
+  !> The next pass that is given up is followed by `first_pause` steps without a pass. Each further one is followed by twice as
+  !> many, and by `longest_pause` at most.
   integer, parameter :: first_pause = 2, longest_pause = 64
 
   type :: pass_backoff_t

@@ -1,8 +1,8 @@
 !> Shortest ways from bodies to others over closed contacts, counted in contacts or in lengths, across subdomains.
 !>
-!> Bodies whose way has become shorter wait in a queue to hand it on to those that they touch, until none can be shortened: where each
-!> contact counts the same, every body waits once (breadth-first search). The result does not depend on the order, because each way is
-!> a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no way but its own.
+!> Bodies whose way has become shorter wait in a queue to hand it on to those that they touch, until none can be shortened: where
+!> each contact counts the same, every body waits once (breadth-first search). The result does not depend on the order, because each
+!> way is a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no way but its own.
 module gravier_ways
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes

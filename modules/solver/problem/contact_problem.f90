@@ -20,8 +20,8 @@ module gravier_contact_problem
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
   !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
-  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed. Grains that sleep are among
-  !> the last: they stand still.
+  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed. Grains that sleep are
+  !> among the last: they stand still.
   !>
   !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
   !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what

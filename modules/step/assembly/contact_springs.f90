@@ -52,8 +52,8 @@ contains
     end associate
   end subroutine pack_spring
 
-  !> The largest deformation of compliant contacts [m], and how stiff they are for the step, h sqrt(k/m), both raised to what they are
-  !> in this problem. Collective.
+  !> The largest deformation of compliant contacts [m], and how stiff they are for the step, h sqrt(k/m), both raised to what they
+  !> are in this problem. Collective.
   subroutine measure_springs(problem, deformation, stiffest)
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(inout) :: deformation, stiffest

@@ -61,8 +61,8 @@ contains
 
   !> Number the bodies that contacts touch and pack bodies and contacts. Free grains come first, in the order in which contacts
   !> meet them, so that a sweep walks through memory (number_shared_first then puts shared ones before the others); then
-  !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, one a grain that sleeps, and one
-  !> a contact where the boundary turns.
+  !> boundaries that forces move, then columns of bodies with prescribed velocities: one a boundary, one a grain that sleeps, and
+  !> one a contact where the boundary turns.
   subroutine pack_subproblem(view, found, decomposition, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(inout) :: found

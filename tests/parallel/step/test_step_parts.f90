@@ -735,8 +735,8 @@ contains
     end do
   end subroutine disturb
 
-  !> Grains count steps at rest, one a step; a change of the impulses on one by more than a twentieth begins anew; so do all where they
-  !> are woken.
+  !> Grains count steps at rest, one a step; a change of the impulses on one by more than a twentieth begins anew; so do all where
+  !> they are woken.
   subroutine check_sleeping()
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
@@ -777,8 +777,8 @@ contains
     call sim%free()
   end subroutine check_sleeping
 
-  !> On a plane that moves, without friction, nothing changes, and yet disks are not taken to rest on it: of two, one upon the other,
-  !> none counts a step while the plane moves, and both count them when it is at rest.
+  !> On a plane that moves, without friction, nothing changes, and yet disks are not taken to rest on it: of two, one upon the
+  !> other, none counts a step while the plane moves, and both count them when it is at rest.
   subroutine check_moving_plane(speed)
     character(len=*), intent(in) :: speed
     type(simulation_t) :: sim

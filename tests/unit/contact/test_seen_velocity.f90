@@ -1,5 +1,5 @@
-!> Whether the terms of a law depend on the relative velocity of a pair is what the law says of itself: pairs of laws that do not see
-!> it are evaluated without one.
+!> Whether the terms of a law depend on the relative velocity of a pair is what the law says of itself: pairs of laws that do not
+!> see it are evaluated without one.
 program test_seen_velocity
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
