@@ -21,12 +21,12 @@ module gravier_ways
   type :: ways_t
     !> length of the way of each body, `unreached` where none is known (n_columns)
     real(dp), allocatable :: length(:)
-    !> the contacts that press or are closed: their bodies and lengths
+    !> contacts that press or are closed
     integer :: n_closed = 0
-    integer, allocatable, private :: pair(:, :)
+    !> where the neighbours of each body over such contacts begin, to `first(b + 1) - 1` (n_columns + 1); these, and the lengths of
+    !> the ways to them (2 n_closed)
+    integer, allocatable, private :: first(:), neighbour(:)
     real(dp), allocatable, private :: step(:)
-    !> the closed contacts of each body, from `first(b)` to `first(b + 1) - 1` (2 n_closed), (n_columns + 1)
-    integer, allocatable, private :: contact(:), first(:)
     !> bodies whose way may be shortened, and those that have one to hand on (n_columns)
     logical, allocatable, private :: open(:), waits(:)
   end type ways_t
@@ -41,30 +41,42 @@ contains
     !> of lengths [m]; absent, each contact counts 1
     real(dp), intent(in), optional :: unit
     real(dp) :: closed
-    integer :: s
+    integer :: s, n
+    !> of the closed contacts: their bodies and lengths
+    integer, allocatable :: pair(:, :)
+    real(dp), allocatable :: step(:)
 
     closed = max(rounded*problem%velocity_scale, soon_closed*problem%error_scale)
     do s = 1, size(ways)
       associate (sub => problem%sub(s))
         allocate (ways(s)%length(sub%n_columns), source=unreached)
         allocate (ways(s)%open(sub%n_columns), ways(s)%waits(sub%n_columns), source=.false.)
-        allocate (ways(s)%pair(2, sub%n_contacts), ways(s)%step(sub%n_contacts))
-        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, ways(s), unit)
-        call list_by_body(ways(s))
+        allocate (pair(2, sub%n_contacts), step(sub%n_contacts))
+        n = 0
+        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, n, pair, step, unit)
+        ways(s)%n_closed = n
+        call list_by_body(pair(:, 1:n), step(1:n), ways(s))
+        deallocate (pair, step)
       end associate
     end do
   end subroutine list_closed
 
-  subroutine take_closed(sub, at, closed, ways, unit)
+  !> The contacts of a subdomain that press or are closed.
+  pure subroutine take_closed(sub, at, closed, n, pair, step, unit)
     type(subproblem_t), intent(in) :: sub
     !> row of the contact data that holds the shift
     integer, intent(in) :: at
     !> shift below which a contact counts as closed [m/s]
     real(dp), intent(in) :: closed
-    type(ways_t), intent(inout) :: ways
+    !> how many they are
+    integer, intent(out) :: n
+    !> their bodies (2, contacts) and lengths (contacts), the first n
+    integer, intent(inout), contiguous :: pair(:, :)
+    real(dp), intent(inout), contiguous :: step(:)
+    !> of lengths [m]
     real(dp), intent(in), optional :: unit
-    real(dp) :: step
-    integer :: g, q, c, n, k
+    real(dp) :: length
+    integer :: g, q, c, k
 
     n = 0
     do g = 1, size(sub%hot, 3)
@@ -72,46 +84,49 @@ contains
         c = (g - 1)*lanes + q
         if (sub%gap(c) > 0.0_dp .and. sub%hot(q, at, g) > closed .and. .not. sub%impulse(q, 1, g) > 0.0_dp) cycle
         n = n + 1
-        ways%pair(:, n) = sub%pair(:, c)
-        ways%step(n) = 1.0_dp
+        pair(:, n) = sub%pair(:, c)
+        step(n) = 1.0_dp
         if (.not. present(unit)) cycle
-        step = sub%gap(c)
+        length = sub%gap(c)
         do k = 1, 2
-          if (sub%pair(k, c) <= sub%n_grains) step = step + sub%radius(sub%pair(k, c))
+          if (sub%pair(k, c) <= sub%n_grains) length = length + sub%radius(sub%pair(k, c))
         end do
-        ways%step(n) = max(0.0_dp, step/unit)
+        step(n) = max(0.0_dp, length/unit)
       end do
     end do
-    ways%n_closed = n
   end subroutine take_closed
 
-  !> List the closed contacts of each body.
-  pure subroutine list_by_body(ways)
+  !> List the neighbours of each body over closed contacts, in the order of these.
+  pure subroutine list_by_body(pair, step, ways)
+    !> bodies of the closed contacts (2, closed contacts), and their lengths
+    integer, intent(in), contiguous :: pair(:, :)
+    real(dp), intent(in), contiguous :: step(:)
     type(ways_t), intent(inout) :: ways
     integer :: c, k, b, n
 
     n = size(ways%open)
     allocate (ways%first(n + 1), source=0)
-    allocate (ways%contact(2*ways%n_closed))
+    allocate (ways%neighbour(2*size(step)), ways%step(2*size(step)))
     associate (first => ways%first)
-      do c = 1, ways%n_closed
+      do c = 1, size(step)
         do k = 1, 2
-          first(ways%pair(k, c)) = first(ways%pair(k, c)) + 1
+          first(pair(k, c)) = first(pair(k, c)) + 1
         end do
       end do
       ! the ends of all, which become their beginnings while they are filled from behind
       do b = 2, n
         first(b) = first(b) + first(b - 1)
       end do
-      first(n + 1) = 2*ways%n_closed + 1
+      first(n + 1) = 2*size(step) + 1
       do b = 1, n
         first(b) = first(b) + 1
       end do
-      do c = ways%n_closed, 1, -1
+      do c = size(step), 1, -1
         do k = 1, 2
-          b = ways%pair(k, c)
+          b = pair(k, c)
           first(b) = first(b) - 1
-          ways%contact(first(b)) = c
+          ways%neighbour(first(b)) = pair(3 - k, c)
+          ways%step(first(b)) = step(c)
         end do
       end do
     end associate
@@ -165,7 +180,7 @@ contains
   pure subroutine shorten_own(ways)
     type(ways_t), intent(inout) :: ways
     !> bodies that wait, in a ring
-    integer :: queue(size(ways%open)), n_waiting, head, b, i, j, k, c
+    integer :: queue(size(ways%open)), n_waiting, head, b, i, j, k
     real(dp) :: way
 
     n_waiting = 0
@@ -181,9 +196,8 @@ contains
       head = merge(1, head + 1, head == size(queue))
       n_waiting = n_waiting - 1
       do k = ways%first(i), ways%first(i + 1) - 1
-        c = ways%contact(k)
-        j = ways%pair(1, c) + ways%pair(2, c) - i
-        way = ways%length(i) + ways%step(c)
+        j = ways%neighbour(k)
+        way = ways%length(i) + ways%step(k)
         if (.not. (way < ways%length(j) .and. ways%open(j))) cycle
         ways%length(j) = way
         if (ways%waits(j)) cycle
