@@ -43,6 +43,7 @@ class BlockStructures(RunTestCase):
                 self.assertIn(f"{number} blocks, volume {volume:.9g}: case.shapes, case.csv, case.nml", made.stdout)
                 run = gravier("case.nml", directory=self.here(name))
                 self.assert_status(run, 0)
+                self.assertIn("\nfinished    all 200 steps reached the accuracy; results", run.stdout)
                 results = package.Run(run.path("case_results"))
                 first, last = results.bodies(0), results.bodies()
                 self.assertEqual(len(first.id), number)

@@ -57,7 +57,6 @@ class Blocks:
         return {"scene": {"dimension": self.dimension, "bodies": "file", "bodies_file": f"{name}.csv", "shapes": f"{name}.shapes",
                           "friction": friction, "density": density},
                 "time": {"step": step, "steps": steps},
-                "solver": {"criterion": "residual", "tolerance": 1e-4, "max_iterations": 20000},
                 "output": {"directory": f"{name}_results", "every": max(1, steps // 10)}}
 
     def write(self, stem, **figures):
