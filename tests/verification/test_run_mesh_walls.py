@@ -172,6 +172,25 @@ class MeshWalls(RunTestCase):
                     np.testing.assert_allclose(np.sort(found.contacts()[:, 0]), np.sort(wanted.contacts()[:, 0]), rtol=1e-6)
         self.assertEqual(len(wanted.contacts()), 2)
 
+    def test_a_corner_that_is_deep(self):
+        """Boxes and hulls that are deeper than their roundings after the step in which they meet a rectangle, a mesh or a large cube bounce as on a
+        plane: the corner touches where it is."""
+        scene = {"time": {"steps": 40}, "scene": {"gravity": [0.0, 0.0, 0.0], "restitution": 0.5}}
+        turn, velocity = [0.9, 0.3, 0.2, 0.1], [0.0, 0.0, -1.0]
+        rectangle = {"shape": "rectangle", "point": [-1.0, -1.0, 0.0], "edge_a": [2.0, 0.0, 0.0], "edge_b": [0.0, 2.0, 0.0]}
+        for shape, height in (("cube", 0.1105), ("askew", 0.0885)):
+            row = body(shape, [0.011, 0.023, height], turn=turn, velocity=velocity)
+            wanted = self.play(f"{shape} on a plane", 3, [row], [{"shape": "plane", "normal": [0.0, 0.0, 1.0]}], scene)
+            self.assertGreater(wanted.velocity[-1, 0, 2], 0.1)
+            found = {"rectangle": self.play(f"{shape} on a rectangle", 3, [row], [rectangle], scene),
+                     "mesh": self.play(f"{shape} on a mesh", 3, [row], [MESH], scene, mesh=floor(1, 2.0, 1)),
+                     # a cube of 10 m is as good as fixed
+                     "cube": self.play(f"{shape} on a cube", 3, [row, body("cube", [0.0, 0.0, -5.0], scale=100.0)], [], scene)}
+            for name, motion in found.items():
+                with self.subTest(shape, wall=name):
+                    rounding = 1e-4 if name == "cube" else 1e-11
+                    np.testing.assert_allclose(motion.velocity[-1, 0], wanted.velocity[-1, 0], rtol=0, atol=rounding)
+
     def test_loads_of_a_box(self):
         """The four points of a cube at rest in the middle of a triangulated floor carry about a quarter of its weight each: balance fixes
         three sums of the four."""

@@ -1,8 +1,9 @@
 !> The direction of least separation of two convex cores that overlap.
 !>
 !> Overlapping convex polyhedra are least separated along the normal of a face of one of them or along the common normal of two
-!> edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map, Gregorius 2013). Its cost grows
-!> with the product of the numbers of edges, so that it is meant for the rare cores that overlap.
+!> edges. The points of the contact are those that touch once the pieces are apart by the depth: the vertex before the face, or
+!> the nearest points of both edges. Pairs of edges come into question where the arcs of their normals cross (the Gauss map,
+!> Gregorius 2013). Its cost grows with the product of the numbers of edges, so that it is meant for the rare cores that overlap.
 module gravier_core_overlap
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
@@ -16,6 +17,8 @@ module gravier_core_overlap
 
   !> the sine of the angle between edges that are taken for parallel
   real(dp), parameter :: parallel = 1.0e-9_dp
+  !> whose faces have the axis, and with it the vertex of the other piece touches: of a, of b, of neither
+  integer, parameter :: of_a = 1, of_b = 2, of_neither = 3
   !> a cosine whose sign rounding may have changed
   real(dp), parameter :: doubtful = 1.0e-9_dp
 
@@ -36,16 +39,17 @@ contains
     type(edges_t) :: edges_a, edges_b
     real(dp) :: n(3)
     integer :: f
+    logical :: taken
 
     found%overlap = .true.
     found%distance = -huge(1.0_dp)
     do f = 1, size(a%face_normal, 2)
       n(:) = -a%face_normal(:, f)
-      call try_axis(a, b, pair, n, found)
+      call try_axis(a, b, pair, n, of_a, found, taken)
     end do
     do f = 1, size(b%face_normal, 2)
       call turn(pair, b%face_normal(:, f), n)
-      call try_axis(a, b, pair, n, found)
+      call try_axis(a, b, pair, n, of_b, found, taken)
     end do
     call find_edges(a, edges_a)
     call find_edges(b, edges_b)
@@ -53,16 +57,19 @@ contains
     if (found%distance > -huge(1.0_dp)) return
     ! cores without faces and without edges that cross
     call find_any_axis(pair, edges_a, edges_b, a, b, n)
-    call try_axis(a, b, pair, n, found)
+    call try_axis(a, b, pair, n, of_neither, found, taken)
   end subroutine find_least_separation
 
   !> Take an axis where it is better than that before.
-  pure subroutine try_axis(a, b, pair, n, found)
+  pure subroutine try_axis(a, b, pair, n, owner, found, taken)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     !> unit vector
     real(dp), intent(in) :: n(3)
+    !> of_a, of_b or of_neither
+    integer, intent(in) :: owner
     type(core_distance_t), intent(inout) :: found
+    logical, intent(out) :: taken
     real(dp) :: x(3), y(3), separation
     integer :: i, j
 
@@ -71,11 +78,19 @@ contains
     call place_a(a, pair, i, x)
     call place_b(b, pair, j, y)
     separation = dot_product(n, x) - dot_product(n, y)
-    if (.not. separation > found%distance + better*(pair%radius_a + pair%radius_b)) return
+    taken = separation > found%distance + better*(pair%radius_a + pair%radius_b)
+    if (.not. taken) return
     found%distance = separation
     found%normal(:) = n
-    ! half-way between the two vertices, across the axis
-    found%point_a(:) = 0.5_dp*(x + y) + 0.5_dp*separation*n
+    select case (owner)
+    case (of_a)
+      found%point_a(:) = y + separation*n
+    case (of_b)
+      found%point_a(:) = x
+    case default
+      ! half-way between the two vertices, across the axis
+      found%point_a(:) = 0.5_dp*(x + y) + 0.5_dp*separation*n
+    end select
     found%point_b(:) = found%point_a - separation*n
     found%n = 1
     found%vertex_a(1) = i
@@ -94,6 +109,7 @@ contains
     !> of the edge of b against the faces of a; 0 for an edge that has none
     real(dp) :: slope(0:size(a%face_normal, 2))
     integer :: i, j, f, turned
+    logical :: taken
 
     do i = 1, edges_a%n
       along_a(:, i) = a%vertex(:, edges_a%vertex(2, i)) - a%vertex(:, edges_a%vertex(1, i))
@@ -123,13 +139,39 @@ contains
         do turned = 1, 2
           ! any two points bound the separation from above
           if (dot_product(n, x) - dot_product(n, y) > found%distance) then
-            if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, found)
+            taken = faces_other(n, a, edges_a%face(:, i), normal_b)
+            if (taken) call try_axis(a, b, pair, n, of_neither, found, taken)
+            if (taken) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
           end if
           n(:) = -n
         end do
       end do
     end do
   end subroutine try_edges
+
+  !> The points where two edges touch once they are apart by the depth: those where their lines are nearest to each other.
+  pure subroutine meet_edges(pair, x, along_a, y, along_b, found)
+    type(placed_pair_t), intent(in) :: pair
+    !> where the edges of a and of b begin [m], and the ways along them for radii of 1; they are not parallel
+    real(dp), intent(in) :: x(3), along_a(3), y(3), along_b(3)
+    !> has the depth and the normal
+    type(core_distance_t), intent(inout) :: found
+    real(dp) :: u(3), w(3), uu, uw, ww, along_u, along_w, s, t
+
+    u(:) = pair%radius_a*along_a
+    w(:) = pair%radius_b*along_b
+    uu = dot_product(u, u)
+    uw = dot_product(u, w)
+    ww = dot_product(w, w)
+    along_u = dot_product(u, y - x)
+    along_w = dot_product(w, y - x)
+    s = (ww*along_u - uw*along_w)/(uu*ww - uw*uw)
+    t = (uw*along_u - uu*along_w)/(uu*ww - uw*uw)
+    s = max(0.0_dp, min(1.0_dp, s))
+    t = max(0.0_dp, min(1.0_dp, t))
+    found%point_a(:) = 0.5_dp*(x + s*u + y + t*w + found%distance*found%normal)
+    found%point_b(:) = found%point_a - found%distance*found%normal
+  end subroutine meet_edges
 
   !> Whether the normals of an edge of a point against a common normal and those of an edge of b along it. Otherwise the arc of one
   !> edge crosses the arc that is opposite to that of the other.

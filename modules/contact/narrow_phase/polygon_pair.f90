@@ -95,12 +95,13 @@ contains
     end if
     vertex_a = extreme_vertex(a, -1.0_dp, normal)
     vertex_b = extreme_vertex(b, 1.0_dp, normal)
-    if (manifold%cores_overlap) then
-      on_a(:) = a%vertex(:, vertex_a)
-      on_b(:) = on_a - distance*normal
-    end if
     call choose_side(a, vertex_a, -1.0_dp, normal, side_a)
     call choose_side(b, vertex_b, 1.0_dp, normal, side_b)
+    if (manifold%cores_overlap) then
+      ! the vertex before the side whose normal it is touches once the cores are apart
+      on_b(:) = b%vertex(:, vertex_b)
+      if (side_a%facing <= side_b%facing) on_b(:) = a%vertex(:, vertex_a) - distance*normal
+    end if
     if (a%n > 1 .and. b%n > 1) call clip_sides(a, b, side_a, side_b, alert, manifold)
     if (manifold%n > 0) return
     manifold%n = 1

@@ -48,6 +48,9 @@ contains
     call find_least_separation(box%piece(1), box%piece(1), pair, found)
     call check_close(found%distance, -depth, tight, "an edge in a face: the depth")
     call check_close(found%normal(1), -1.0_dp, tight, "an edge in a face: the normal")
+    call check_close(found%point_b(1), half - depth, tight, "an edge in a face: a point of the edge")
+    call check_close(found%point_b(2), 0.0_dp, tight, "an edge in a face: not half-way to a corner of the face")
+    call check_close(found%point_a(1), half, tight, "an edge in a face: the point of the face before it")
     ! edges across each other, each half-way between two faces
     turn = about(vec(1.0_dp, 1.0_dp, 0.0_dp), 0.5_dp*pi)
     pair%rotation(:, :) = turn%m
@@ -56,6 +59,9 @@ contains
     call check_close(found%distance, -depth, 10*tight, "edges: the depth")
     call check_close(found%normal(1), -sqrt(0.5_dp), tight, "edges: the normal")
     call check_close(found%normal(2), -sqrt(0.5_dp), tight, "edges: is between the faces")
+    way(:) = [half, half, 0.0_dp]
+    call check_close(norm2(found%point_a - way), 0.0_dp, 10*tight, "edges: the point of the first")
+    call check_close(norm2(found%point_a - found%point_b - found%distance*found%normal), 0.0_dp, tight, "edges: the way between")
   end subroutine test_overlap
 
   !> Cores without faces.
@@ -85,7 +91,7 @@ contains
     type(body_shape_t) :: hull(6), bar
     type(placed_pair_t) :: pair
     type(core_distance_t) :: found
-    real(dp) :: points(3, 14), way(3), best, worst
+    real(dp) :: points(3, 14), way(3), best, worst, beside
     integer :: k, p, trial, by_edges
     logical :: edges
 
@@ -102,6 +108,7 @@ contains
     end do
     call make_capsule("bar", 1.2_dp, 0.05_dp, bar, error)
     worst = 0.0_dp
+    beside = 0.0_dp
     by_edges = 0
     do trial = 1, 600
       u = draws%direction()
@@ -112,6 +119,7 @@ contains
         call try_all_axes(a%piece(1), b%piece(1), pair, best, edges)
         if (best < 0.0_dp) worst = max(worst, abs(found%distance - best))
         if (edges .and. best < 0.0_dp) by_edges = by_edges + 1
+        if (best < 0.0_dp) beside = max(beside, outside(a%piece(1), b%piece(1), pair, found))
         way(:) = 0.3_dp*u%x
         call put_pair(a, bar, way, random_turn(draws), pair)
         call find_least_separation(a%piece(1), bar%piece(1), pair, found)
@@ -120,8 +128,29 @@ contains
       end associate
     end do
     call check_close(worst, 0.0_dp, 1.0e-12_dp, "no axis separates more")
+    call check_close(beside, 0.0_dp, 1.0e-12_dp, "the points of the contact are on both hulls")
     call check(by_edges > 50, "some of them are common normals of edges")
   end subroutine test_all_axes
+
+  !> How far the points of a contact are outside the cores that they belong to [m].
+  pure real(dp) function outside(a, b, pair, found)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    type(core_distance_t), intent(in) :: found
+    real(dp) :: x(3), out(3)
+    integer :: f
+
+    outside = 0.0_dp
+    do f = 1, size(a%face_normal, 2)
+      call place_a(a, pair, a%face_vertex(a%face_first(f)), x)
+      outside = max(outside, dot_product(a%face_normal(:, f), found%point_a - x))
+    end do
+    do f = 1, size(b%face_normal, 2)
+      call place_b(b, pair, b%face_vertex(b%face_first(f)), x)
+      out(:) = matmul(pair%rotation, b%face_normal(:, f))
+      outside = max(outside, dot_product(out, found%point_b - x))
+    end do
+  end function outside
 
   !> The greatest separation of all axes that can be it.
   subroutine try_all_axes(a, b, pair, best, edges)

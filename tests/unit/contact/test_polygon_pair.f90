@@ -143,6 +143,7 @@ contains
   subroutine test_overlap()
     type(placed_piece_t) :: upper, lower
     type(manifold_t) :: manifold
+    integer :: k
 
     call put_brick(0.0_dp, 0.0_dp, 0.0_dp, lower)
     call put_brick(0.3_dp, 0.9_dp, 0.0_dp, upper)
@@ -150,6 +151,18 @@ contains
     call check(manifold%cores_overlap, "cores overlap")
     call check_close(norm2(manifold%normal(1:2) - [0.0_dp, 1.0_dp]), 0.0_dp, rounding, "the way out is up")
     call check_close(maxval(abs(manifold%gap(1:manifold%n) + 0.1_dp)), 0.0_dp, rounding, "how deep they are")
+    ! a corner in a side, whichever of the two is the candidate
+    call put_brick(0.3_dp, 0.45_dp + 1.5_dp*sqrt(0.5_dp), 0.25_dp*acos(-1.0_dp), upper)
+    do k = 1, 2
+      if (k == 1) call find_polygon_manifold(upper, lower, 0.01_dp, manifold)
+      if (k == 2) call find_polygon_manifold(lower, upper, 0.01_dp, manifold)
+      call check(manifold%n == 1 .and. manifold%cores_overlap, "a corner in a side")
+      call check_close(manifold%normal(2), merge(1.0_dp, -1.0_dp, k == 1), rounding, "the normal of the side")
+      ! the round corner is nearer to the middle of its brick than the sharp one
+      call check_close(manifold%gap(1), -0.05_dp + (sqrt(2.0_dp) - 1.0_dp)*rho, rounding, "how deep the corner is")
+      call check_close(manifold%point(1, 1), 0.3_dp - 0.5_dp*sqrt(0.5_dp), 1.0e-9_dp, "the contact is at the corner")
+      call check_close(manifold%point(2, 1), 0.5_dp + 0.5_dp*manifold%gap(1), rounding, "half-way between both")
+    end do
     call put_brick(0.0_dp, 0.0_dp, 0.0_dp, upper)
     call find_polygon_manifold(upper, lower, 0.01_dp, manifold)
     call check(manifold%n > 0 .and. all(abs(manifold%gap(1:manifold%n)) < huge(1.0_dp)), "one brick in the place of another")
