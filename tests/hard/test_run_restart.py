@@ -121,6 +121,20 @@ class Restart(RunTestCase):
         for stop, before, after in ((45, 1, 2), (61, 2, 1), (62, 2, 4)) if LONG else ((45, 1, 2), (61, 2, 1)):
             self.one_restart(case, stop, before, after, straight)
 
+    def test_defaults(self):
+        """A fall by the default solver, whose checks come when the solves before tell so: with a trace, or where the residual ends solves, they come
+        by number."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [12, 12], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3,
+                          "alert_distance": 0.003},
+                "time": {"step": 1e-3, "steps": 130}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2},
+                "output": {"every": 10, "checkpoint_every": 5}}
+        straight = self.straight("defaults", case)
+        iterations = read_csv(os.path.join(straight, "results", "history.csv"))["iterations"]
+        # checks come at other iterations than every tenth
+        self.assertGreater(np.count_nonzero(iterations[95:] % 10), 10)
+        for stop, before, after in ((95, 1, 2), (110, 2, 1)):
+            self.one_restart(case, stop, before, after, straight)
+
     def test_methods(self):
         """Every method, and without a warm start; in 3D with walls of another friction."""
         cases = {
