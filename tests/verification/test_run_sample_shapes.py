@@ -43,7 +43,8 @@ CASES = {
     "loose": (SOLIDS, SPACE),
     "lattice": (SOLIDS, merged(SPACE, {"sample": {"arrangement": "lattice"}})),
     "settled": (SOLIDS, merged(SPACE, FEW, {"sample": {"preparation": "settled"}})),
-    "compacted": (SOLIDS, merged(SPACE, FEW, {"scene": {"friction": 0.0}, "sample": {
+    # with twice this step lids trap overlaps of some packings, which then do not come to rest: doc/samples.md
+    "compacted": (SOLIDS, merged(SPACE, FEW, {"scene": {"friction": 0.0}, "time": {"step": 5e-4}, "sample": {
         "preparation": "compacted", "pressure": 1e4, "rest_tolerance": 1e-4}, "solver": {"method": "nlgs", "tolerance": 1e-5},
         "decomposition": {"subdomains": None, "repartition_every": None}})),
     "planar": (FLATS, PLANE),
