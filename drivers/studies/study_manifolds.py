@@ -20,8 +20,12 @@ ACCEPTED = {"duality": 1.0, "distance": 1e-12, "normal": 1e-9}
 JUMPS = 0.005
 
 
+#: what makes the pairs; the launcher reads this line, and builds the program before it runs the study
+TEST_PROGRAM = "test_hard_polyhedron_fuzz"
+
+
 def program():
-    path = Path(os.environ.get("GRAVIER_BIN_DIR", "")).parent / "tests" / "bin" / "test_hard_polyhedron_fuzz"
+    path = Path(os.environ.get("GRAVIER_BIN_DIR", "")).parent / "tests" / "bin" / TEST_PROGRAM
     if not path.is_file():
         sys.exit(f"study_manifolds: {path}: no such program: build with -DGRAVIER_TESTS=ON")
     return path

@@ -64,6 +64,21 @@ class Studies(unittest.TestCase):
         self.assertGreater(len(found), 15)
         self.assertLessEqual(NO_FILES | set(NAMED), found)
 
+    def test_programs_of_tests(self):
+        """A study that runs a program of the tests names it in the line that the launcher reads."""
+        pattern = re.search(r"sed -n 's/\^(TEST_PROGRAM = .*)\$/", Path(SOURCE, "gravier").read_text(encoding="utf-8"))[1]
+        pattern = re.compile("^" + pattern.replace("\\(", "(").replace("\\)", ")") + "$", re.MULTILINE)
+        named = {}
+        for path in sorted(Path(SOURCE, "drivers/studies").glob("*.py")):
+            text = path.read_text(encoding="utf-8")
+            if re.search(r"tests\W+bin", text) or "TEST_PROGRAM" in text:
+                named[path.name] = pattern.findall(text)
+        self.assertIn("study_manifolds.py", named)
+        for name, programs in named.items():
+            self.assertEqual(len(programs), 1, name)
+            kind, test = programs[0].removeprefix("test_").split("_", 1)
+            self.assertTrue(Path(SOURCE, "tests", kind, f"test_{test}.f90").is_file(), programs[0])
+
     def test_quick_forms_and_statuses(self):
         """Each study has --quick, says its exit status, and ends with that of a table."""
         for name, text in names():
