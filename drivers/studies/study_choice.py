@@ -7,11 +7,11 @@
 
 leaves in DIR study_choice.csv, a row for each quantity of each setting, and prints the tables of doc/choosing.md. Each scene is one of data/ with a
 shorter time or with fewer grains. Each setting, a step and an accuracy, has several runs, which begin from places of the grains that differ by
-a ten-thousandth of a diameter (the lattice of the settling: from other radii). Values are means. The reference is that of the smallest step and
-tightest accuracy; a deviation is uncertain by twice its standard error, of both means. A value is right where it deviates by no more than 2 % (a change of
-volume: 10 %), or than that where it is larger. Seconds are processor seconds of a run on one rank; cost is seconds over those of the cheapest setting that is right. The
-closing table has the deviations of the default accuracy and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is
-missed."""
+a ten-thousandth of a diameter (the lattice of the settling: from other radii). Values are means over these runs. The reference is the mean of the
+setting with the smallest step and the tightest accuracy. The uncertainty of a deviation is twice its standard error, which has those of both means.
+A value is right where its deviation is at most 2 % (of a change of volume: 10 %), or at most its uncertainty where this is larger. Seconds are
+processor seconds of a run on one rank. Cost is seconds over those of the cheapest setting that is right. The closing table has the deviations of the
+default accuracy and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import resource
 import sys
@@ -27,11 +27,12 @@ from study_support import BINARIES, SOURCE, gravier, read_history, sized, states
 ACCURACIES = (0.3, 0.1, 0.03)
 #: deviation that counts as none: of a change of volume, which is a small difference, and of all else
 RIGHT_VOLUME, RIGHT = 0.1, 0.02
-#: standard errors by which a deviation is uncertain, and by which one of forty may deviate
+#: standard errors that make the uncertainty of a deviation, and those that the closing table allows to each of its forty
 UNCERTAIN, FAR = 2.0, 3.0
-#: solves that may miss the default accuracy
+#: share of the solves that may miss their accuracy
 MISSED = 0.0025
-#: of a realisation, in mean diameters; from a hundredth of it runs of one setting stay alike for so long that their scatter is too small
+#: by which places of grains differ between runs of one setting, in mean diameters. With a hundredth of this the runs stay alike for so long
+#: that their scatter comes out too small
 SHIFT = 1.0e-4
 
 

@@ -50,18 +50,19 @@ contains
     subroutine check_input(path, key)
       character(len=*), intent(in) :: path, key
       type(place_t) :: place
-      integer :: first, last
+      character(len=:), allocatable :: name
+      integer :: first
 
       if (path == "" .or. allocated(error)) return
       place = place_of(trim(path))
       if (.not. place%is_there()) return
       first = 1
-      do while (first <= len(names))
-        last = first + index(names(first:)//",", ",") - 2
-        if (place_of(trim(config%output%directory)//"/"//names(first:last)) == place) call raise(error, status_input, &
-          & config%file//": "//key//" = '"//trim(path)//"': this run would replace the file by its own "//names(first:last)// &
+      do
+        call take_name(names, first, name)
+        if (name == "") exit
+        if (place_of(trim(config%output%directory)//"/"//name) == place) call raise(error, status_input, &
+          & config%file//": "//key//" = '"//trim(path)//"': this run would replace the file by its own "//name// &
           & "; expected a copy in another place, or another `directory` of &output")
-        first = last + 2
       end do
     end subroutine check_input
 
@@ -84,15 +85,16 @@ contains
     !> of the files, with commas between
     character(len=*), intent(in) :: names
     type(error_t), allocatable, intent(inout) :: error
-    integer :: first, last
+    character(len=:), allocatable :: name
+    integer :: first
 
     first = 1
-    do while (first <= len(names) .and. .not. allocated(error))
-      last = first + index(names(first:)//",", ",") - 2
-      if (is_directory(trim(config%output%directory)//"/"//names(first:last))) call raise(error, status_input, config%file// &
-        & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//names(first:last)// &
+    do
+      call take_name(names, first, name)
+      if (name == "" .or. allocated(error)) exit
+      if (is_directory(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
+        & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//name// &
         & ", as a file of this run; expected another name for one of them")
-      first = last + 2
     end do
   end subroutine check_outputs
 
@@ -100,21 +102,35 @@ contains
   function older_files(config) result(found)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: found
-    character(len=:), allocatable :: names
-    integer :: first, last
+    character(len=:), allocatable :: names, name
+    integer :: first
     logical :: exists
 
     found = ""
     names = file_names(config, wanted=.false.)
     first = 1
-    do while (first <= len(names))
-      last = first + index(names(first:)//",", ",") - 2
-      inquire (file=trim(config%output%directory)//"/"//names(first:last), exist=exists)
-      if (exists) found = found//", "//names(first:last)
-      first = last + 2
+    do
+      call take_name(names, first, name)
+      if (name == "") exit
+      inquire (file=trim(config%output%directory)//"/"//name, exist=exists)
+      if (exists) found = found//", "//name
     end do
     found = found(3:)
   end function older_files
+
+  !> The next of some names, empty after the last.
+  pure subroutine take_name(names, first, name)
+    !> with commas between
+    character(len=*), intent(in) :: names
+    !> where it begins, 1 for the first name; moved to where the one after it does
+    integer, intent(inout) :: first
+    character(len=:), allocatable, intent(out) :: name
+
+    name = ""
+    if (first > len(names)) return
+    name = names(first:first + index(names(first:)//",", ",") - 2)
+    first = first + len(name) + 1
+  end subroutine take_name
 
   !> Names of the files of the outputs that the input wants, or does not want, with commas between.
   function file_names(config, wanted) result(names)

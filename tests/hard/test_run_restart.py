@@ -122,8 +122,8 @@ class Restart(RunTestCase):
             self.one_restart(case, stop, before, after, straight)
 
     def test_defaults(self):
-        """A fall by the default solver, whose checks come when the solves before tell so: with a trace, or where the residual ends solves, they come
-        by number."""
+        """A fall by the default solver, which learns from its solves when the next ones are worth a check. Runs with a trace, and runs that
+        end by the residual, make checks at fixed iterations instead, so that the other tests here do not see what it has learned."""
         case = {"scene": {"bodies": "lattice", "lattice_count": [12, 12], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3,
                           "alert_distance": 0.003},
                 "time": {"step": 1e-3, "steps": 130}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2},
