@@ -1,9 +1,11 @@
 !> The velocity error of a solve, estimated without knowing the solution: |V - V*|_M over the root of the mass of the grains in
 !> contact, a root mean square velocity. The natural-map residual does not see waves that are long against a grain; this does.
 !>
-!>   Y  projection of the error on what test impulses move (gravier_test_impulses).
+!>   Y  projection of the error on what test impulses move (gravier_test_impulses); C where that is smaller, because no projection
+!>      of the error is larger than the error.
 !>   L  sum over levels: how fast all that lies above a depth sinks onto it (gravier_levels).
-!>   E  = sqrt((a Y)^2 + L^2), a = 2.8, because test impulses see but a part of long waves.
+!>   E  = sqrt((a Y)^2 + (b L)^2), a = 3.2, because test impulses see but a part of long waves, and b = 0.6, because they see a part
+!>      of what sinks, too. Both are measured.
 !>   C  bound where everything prescribed is at rest and no contact sends velocities back: rest is admissible then, and
 !>      C^2 = |V|_M^2 + 2 sum r_n s bounds the error of a convex problem. It costs nothing, and is the error where the solution is
 !>      at rest. The estimate is the smaller of E and C, and C where that is below a tenth of the error allowed.
@@ -21,8 +23,8 @@ module gravier_velocity_error
   private
   public :: velocity_error_t, copies_ready, violations_allowed
 
-  !> weight of Y in the estimate
-  real(dp), parameter :: weight_of_projection = 2.8_dp
+  !> weights of Y and of L in the estimate
+  real(dp), parameter :: weight_of_projection = 3.2_dp, weight_of_levels = 0.6_dp
   !> fraction of the error allowed that bodies may move with where all could rest; factor of L in what is allowed
   real(dp), parameter :: share_at_rest = 0.1_dp, weight_of_sinking = 4.0_dp
   !> times the error allowed by which a contact may violate its law: the error is a mean by mass, which light bodies hide in
@@ -210,11 +212,11 @@ contains
   end function velocity_error_measure_of_start
 
   !> E with a weight on L [m/s].
-  pure real(dp) function velocity_error_wave(self, weight_of_levels) result(wave)
+  pure real(dp) function velocity_error_wave(self, weight) result(wave)
     class(velocity_error_t), intent(in) :: self
-    real(dp), intent(in) :: weight_of_levels
+    real(dp), intent(in) :: weight
 
-    wave = hypot(weight_of_projection*self%projection, weight_of_levels*self%levels%error)
+    wave = hypot(weight_of_projection*self%projection, weight*self%levels%error)
   end function velocity_error_wave
 
   !> Whether C alone says that what moves is no more than what may where all could rest.
@@ -227,7 +229,7 @@ contains
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
     estimate = self%bound_by_rest
-    if (.not. (self%is_early .or. self%rests())) estimate = min(estimate, self%wave(1.0_dp))
+    if (.not. (self%is_early .or. self%rests())) estimate = min(estimate, self%wave(weight_of_levels))
   end function velocity_error_estimate
 
   !> C, Y and the largest violation, and the residual with them, with v_global and the reactions evaluated: one pass over
@@ -249,7 +251,7 @@ contains
     self%iterations = iteration
     self%largest_violation = found%largest_violation
     self%projection = 0.0_dp
-    if (self%mass > 0.0_dp) self%projection = sqrt(found%square/self%mass)
+    if (self%mass > 0.0_dp) self%projection = min(sqrt(found%square/self%mass), self%bound_by_rest)
   end subroutine velocity_error_assess
 
   !> L, after `assess`; and, where all else is within the error allowed, whether some body moves among bodies at rest, and how fast
