@@ -25,6 +25,8 @@ module gravier_user_loop
     integer(i8) :: settings = 0
     !> of grains with each other
     type(coefficients_t) :: between_grains
+    !> since the last step, velocities of bodies were set on this rank; velocities or forces were
+    logical, private :: velocities_set = .false., bodies_set = .false.
     !> why the run is over, where an error has ended it
     type(error_t), allocatable, private :: cause
   contains
@@ -82,24 +84,29 @@ contains
   subroutine user_loop_step(self, error)
     class(user_loop_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: mark(2)
+    real(dp) :: mark(4)
 
     if (.not. self%goes_on()) then
       call raise(error, status_input, "step: the run is over after step "//to_text(self%run%simulation%step)// &
         & "; expected a run that goes on")
       return
     end if
-    if (self%comm%size > 1) then
-      ! words of 52 bits are exact as reals
-      mark(1) = real(ibits(self%settings, 0, 52), dp)
-      mark(2) = -mark(1)
-      call self%comm%highest_of(mark)
-      if (abs(mark(1) + mark(2)) > 0.0_dp) then
-        call raise(error, status_input, "step: ranks have set different drives, loads, coefficients or bodies; "// &
-          & "expected the same calls with the same values on all ranks")
-        return
-      end if
+    ! words of 52 bits are exact as reals
+    mark(1) = real(ibits(self%settings, 0, 52), dp)
+    mark(2) = -mark(1)
+    ! a rank sets what belongs to its own bodies, and may have none
+    mark(3) = merge(1.0_dp, 0.0_dp, self%velocities_set)
+    mark(4) = merge(1.0_dp, 0.0_dp, self%bodies_set)
+    call self%comm%highest_of(mark)
+    if (abs(mark(1) + mark(2)) > 0.0_dp) then
+      call raise(error, status_input, "step: ranks have set different drives, loads, coefficients or bodies; "// &
+        & "expected the same calls with the same values on all ranks")
+      return
     end if
+    self%run%simulation%velocities_set = mark(3) > 0.0_dp
+    if (mark(4) > 0.0_dp) call self%run%simulation%wake()
+    self%velocities_set = .false.
+    self%bodies_set = .false.
     call self%run%step(error)
     if (allocated(error)) self%cause = error
   end subroutine user_loop_step
@@ -115,7 +122,8 @@ contains
     if (allocated(error)) self%cause = error
   end subroutine user_loop_stop
 
-  !> Write a checkpoint of the present step. Failure (status_input): the run is over. Collective.
+  !> Write a checkpoint of the present step. Failures (status_input): the run is over; bodies were added or removed, which enter and
+  !> leave with the next step and would be lost. Collective.
   subroutine user_loop_write_checkpoint(self, error)
     class(user_loop_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
@@ -125,6 +133,13 @@ contains
         & "; expected a run that goes on")
       return
     end if
+    associate (simulation => self%run%simulation)
+      if (simulation%inflow%given%n > 0 .or. allocated(simulation%decomposition%dismissed)) then
+        call raise(error, status_input, "checkpoint: bodies that were added or removed enter or leave at the start of the next "// &
+          & "step; expected a checkpoint before these calls, or after that step")
+        return
+      end if
+    end associate
     call self%run%write_checkpoint(error)
     if (allocated(error)) self%cause = error
   end subroutine user_loop_write_checkpoint
@@ -224,7 +239,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer :: k, rows
 
-    associate (simulation => self%run%simulation, owned => self%run%simulation%decomposition%owned(s))
+    associate (owned => self%run%simulation%decomposition%owned(s))
       select case (name)
       case ("velocity")
         rows = owned%nv
@@ -253,9 +268,10 @@ contains
         do k = 1, owned%n
           if (owned%glued(k) == 0) owned%velocity(:, k) = values(:, k)
         end do
-        simulation%velocities_set = .true.
+        self%velocities_set = .true.
       end if
-      call simulation%wake()
+      self%bodies_set = .true.
+      call self%run%simulation%wake()
     end associate
   end subroutine user_loop_set_array
 

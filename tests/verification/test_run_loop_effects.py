@@ -215,6 +215,29 @@ with gravier.Simulation(case, quiet=True) as s:
         # what the bodies were given has not been taken away from them
         self.assertLess(history["carried_away"][-1], -1.0)
 
+    def test_bodies_set_on_some_ranks(self):
+        """A rank without a subdomain sets nothing, and one may set what it wants to: the same bits as on one rank. Grains that sleep wake on
+        all ranks."""
+        groups = merged(HEAP, {"solver": {"sleeping": True, "tolerance": 1e-3}, "time": {"steps": 910}, "output": {"every": 300}})
+        script = """
+with gravier.Simulation(case, quiet=True, forces=True) as s:
+    while s.goes_on:
+        s.step()
+        for part in s.subdomains:
+            if s.made == 10 and 1 in part.id:
+                part.velocity = np.where((part.id == 1)[:, None], [0.1, 1.0], part.velocity)
+                part.spin = np.where((part.id == 1)[:, None], 3.0, part.spin)
+            if s.made == 900 and 48 in part.id:
+                part.force = np.where((part.id == 48)[:, None], [0.0, 1.0], 0.0)
+"""
+        for subdomains in (1, 2):
+            case = merged(groups, {"decomposition": {"subdomains": subdomains}})
+            runs = [self.play(f"some{subdomains}_{ranks}", case, script, ranks=ranks) for ranks in (1, 2)]
+            self.same(*runs)
+            asleep = runs[0].history()["sleeping"]
+            self.assertGreater(asleep[899], 20)
+            self.assertEqual(asleep[900], 0)
+
     def test_bodies_come_and_go(self):
         script = """
 with gravier.Simulation(case, quiet=True) as s:

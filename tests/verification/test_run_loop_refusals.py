@@ -110,6 +110,13 @@ with gravier.Simulation(case, quiet=True) as s:
                 raise AssertionError("not refused: " + statement)
     s.remove([48])
     s.remove(np.array([47]))
+    try:
+        s.checkpoint()
+    except gravier.SimulationError as error:
+        assert str(error) == ("checkpoint: bodies that were added or removed enter or leave at the start of the next step; expected a "
+                              "checkpoint before these calls, or after that step"), str(error)
+    else:
+        raise AssertionError("a checkpoint that loses what was removed")
     old = s.bodies.position
     own = s.subdomains[0].position
     copy = np.array(own)
