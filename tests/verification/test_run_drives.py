@@ -87,7 +87,7 @@ class Moves(SmallScene):
             record = self.play(f"glued {dimension}", [Grain(place, radius=RADIUS, group=1) for place in places],
                                [{"shape": "grains", "group": 1, "pivot": floats(pivot),
                                  "rotation": rate if dimension == 2 else floats(rate * axis)}],
-                               steps=10000, output={"every": 1000})
+                               steps=10000, output={"every": 1000}, scene={"friction": 0.3})
             case = f"glued grains about a pivot, 10^4 steps, {dimension}D"
 
             def distances(places):
@@ -100,6 +100,8 @@ class Moves(SmallScene):
             turned = (np.cos(angle) * arm + np.sin(angle) * np.cross(axis, arm) +
                       (1 - np.cos(angle)) * (arm @ axis)[:, None] * axis)
             self.verify(case, "places [m]", record.position, turned[..., :dimension] + pivot, 1e-10)
+            spin = [rate] if dimension == 2 else rate * axis
+            self.verify(case, "spin [rad/s]", record.spin, np.broadcast_to(spin, record.spin.shape), 1e-14)
         self.both(check)
 
 

@@ -51,6 +51,21 @@ class Regions(RunTestCase):
     def region(self, run, name, step=None):
         return package.Run(os.path.join(run.directory, "results")).region(name, step)
 
+    # ---- contacts
+
+    def test_contacts_of_grains_that_cross(self):
+        """Ten spheres roll over the side of a region in the second half of a step, beside one at rest in it: each has one contact, on
+        whichever side it is counted."""
+        places = [[0.0, 0.05 * k, R] for k in range(10)] + [[-0.05, 0.0, R]]
+        velocities = [[1.0, 0.0, 0.0]] * 10 + [[0.0, 0.0, 0.0]]
+        case = {"scene": {"dimension": 3, "bodies": "file", "bodies_file": grains(self.here("cross.csv"), places, velocities)},
+                "boundary": {"name": "floor", "shape": "plane", "normal": [0, 0, 1]},
+                "region": {"name": "left", "upper": [0.0098]}, "time": {"step": 1e-3, "steps": 20},
+                "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 4}, "output": {"every": 1}}
+        history = self.play("cross", case, ranks=2).history()
+        self.assertEqual(history["left_grains"].tolist(), [11] * 9 + [1] * 11)
+        self.assertEqual(history["left_contacts_per_grain"].tolist(), [1] * 20)
+
     # ---- stress
 
     def test_column(self):

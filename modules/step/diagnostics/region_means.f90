@@ -53,8 +53,9 @@ module gravier_region_means
   end type region_means_t
 
   !> rows of the sums of a bin: centres of free grains inside, volume of grains, mass of free grains, twice their kinetic energy
-  !> without spins, ends of contacts at them, momentum (nd), stress times volume and step (nd**2)
-  integer, parameter :: centres = 1, volume = 2, mass = 3, energy = 4, ends = 5, momentum = 5
+  !> without spins; ends of contacts at free grains, and centres of these grains in the middle of the step; momentum (nd), stress
+  !> times volume and step (nd**2)
+  integer, parameter :: centres = 1, volume = 2, mass = 3, energy = 4, ends = 5, holders = 6, momentum = 6
 
 contains
 
@@ -242,8 +243,9 @@ contains
     end associate
   end subroutine add_grains
 
-  !> Add the contacts of a subdomain of this rank: p l^T by the share of the branch l that lies in a bin (Weber 1966), and their
-  !> ends at free grains by the centres of these. Places are those of the middle of the step, at which contacts are found.
+  !> Add the contacts of a subdomain of this rank: p l^T by the share of the branch l that lies in a bin (Weber 1966); their ends at
+  !> free grains, and all free grains, by the centres of these. Places are those of the middle of the step, at which contacts are
+  !> found: a grain is in the same bin as the ends of its contacts.
   subroutine add_contacts(grid, halo, problem, s, bins)
     type(region_grid_t), intent(in) :: grid
     type(halo_t), intent(in) :: halo
@@ -257,6 +259,9 @@ contains
 
     nd = grid%nd
     associate (sub => problem%sub(s), view => halo%view(s))
+      do i = 1, view%bodies%n
+        if (view%origin(i) > 0 .and. view%bodies%glued(i) == 0) call add_one(holders, view%bodies%position(:, i))
+      end do
       do c = 1, sub%n_contacts
         call find_branch(problem%kernels, sub, c, branch)
         call problem%impulse_on_candidate(s, c, p)
@@ -271,9 +276,9 @@ contains
           from(:) = to - branch
         end if
         if (sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) then
-          if (view%bodies%glued(i) == 0) call add_end(view%bodies%position(:, i))
+          if (view%bodies%glued(i) == 0) call add_one(ends, view%bodies%position(:, i))
           if (j > 0) then
-            if (view%bodies%glued(j) == 0) call add_end(view%bodies%position(:, j))
+            if (view%bodies%glued(j) == 0) call add_one(ends, view%bodies%position(:, j))
           end if
         end if
         call grid%share_segment(from, to, list)
@@ -289,13 +294,14 @@ contains
 
   contains
 
-    subroutine add_end(x)
+    subroutine add_one(row, x)
+      integer, intent(in) :: row
       real(dp), intent(in) :: x(:)
       integer :: bin
 
       bin = grid%bin_of(x)
-      if (bin > 0) bins(ends, bin) = bins(ends, bin) + 1.0_dp
-    end subroutine add_end
+      if (bin > 0) bins(row, bin) = bins(row, bin) + 1.0_dp
+    end subroutine add_one
 
   end subroutine add_contacts
 
@@ -321,7 +327,7 @@ contains
       figures%upper(:, k) = grid%upper
       figures%lower(grid%axis, k) = grid%side(k - 1)
       figures%upper(grid%axis, k) = grid%side(k)
-      if (sums(centres, k) > 0.0_dp) figures%contacts_per_grain(k) = sums(ends, k)/sums(centres, k)
+      if (sums(holders, k) > 0.0_dp) figures%contacts_per_grain(k) = sums(ends, k)/sums(holders, k)
       if (sums(mass, k) > 0.0_dp) then
         figures%velocity(:, k) = sums(momentum + 1:momentum + nd, k)/sums(mass, k)
         figures%granular_temperature(k) = max(sums(energy, k)/sums(mass, k) - sum(figures%velocity(:, k)**2), 0.0_dp)/nd

@@ -130,7 +130,7 @@ contains
     end if
   end subroutine turn_with
 
-  !> Give glued grains the velocity of their boundary where they are.
+  !> Give glued grains the velocity of their boundary where they are, and its spin.
   subroutine set_glued_velocities(decomposition)
     type(decomposition_t), intent(inout) :: decomposition
     integer :: s, k, nd
@@ -140,8 +140,11 @@ contains
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
           if (owned%glued(k) == 0) cycle
-          owned%velocity(:, k) = 0.0_dp
-          call decomposition%boundaries(owned%glued(k))%velocity_at(owned%position(:, k), owned%velocity(1:nd, k))
+          associate (boundary => decomposition%boundaries(owned%glued(k)))
+            call boundary%velocity_at(owned%position(:, k), owned%velocity(1:nd, k))
+            if (owned%nv == nd + 1) owned%velocity(nd + 1, k) = boundary%spin(3)
+            if (owned%nv == nd + 3) owned%velocity(nd + 1:, k) = boundary%spin
+          end associate
         end do
       end associate
     end do
