@@ -335,8 +335,8 @@ contains
     call sim%free()
   end subroutine test_attraction
 
-  !> A column below a fixed lid: the last change is a stress that moves nearly nothing, but its power is not small. The projection on
-  !> it would be a hundred times the velocity of all disks, which is the error; C bounds it.
+  !> A column below a fixed lid: the last change is a stress that moves nearly nothing, but its power is not small. The projection
+  !> on it would be a hundred times the velocity of all disks, which is the error; C bounds it.
   subroutine test_self_stress(n_subdomains)
     integer, intent(in) :: n_subdomains
     integer, parameter :: count = 10
