@@ -710,6 +710,37 @@ class Import(RunTestCase):
         made = [self.case_of(self.convert(self.box(2, **files))[0]) for files in (good, twice)]
         self.assertEqual(*(text[text.index("  dimension"):] for text in made))
 
+    def test_files_of_others_stay(self):
+        """An import replaces the files of an import, and no other: not results, nor a case or a table of the user's own."""
+        disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+        wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        moved = drive(2, 2, [("vlocy", k, 0.0, 0.1 * (k == 1), 9.0, 0.0, 1.0, 0.0) for k in (1, 2, 3)])
+        contacts = "$icdan  DKJCx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      2  JONCx      1  noctc\n" + " " * 29 + \
+            values(n1=0.0, n2=1.0) + "\n" + " " * 29 + "gapTT " + real(0.0) + "\n"
+        box = self.box(2, disk + wall, laws, moved, contacts=contacts)
+        folder, _ = self.convert(box)
+        made = sorted(os.listdir(folder))
+        self.assertEqual(made, ["case.h5", "case.nml", "case_contacts.csv", "case_drive_1.csv"])
+        command = [sys.executable, IMPORT, box, "--step", "1e-3", "--steps", "50", "--out", "case"]
+        again = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        self.assertEqual((again.returncode, sorted(os.listdir(folder))), (0, made), again.stderr)
+        with h5py.File(os.path.join(self.scratch, "own.h5"), "w") as file:
+            file["bodies/id"] = [1]
+        with open(os.path.join(self.scratch, "own.h5"), "rb") as file:
+            image = file.read()
+        for name in made:
+            with self.subTest(name), open(os.path.join(folder, name), "rb") as file:
+                before = file.read()
+                own = write(os.path.join(folder, name), image if name == "case.h5" else b"own\n")
+                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertRegex(done.stderr, rf"\Agravier_import: error: --out case: {name}: there is a file of another kind or origin, which is not .*\n\Z")
+                with open(own, "rb") as kept:
+                    self.assertEqual(kept.read(), image if name == "case.h5" else b"own\n")
+                self.assertEqual(sorted(os.listdir(folder)), made)
+                write(own, before)
+
 
 if __name__ == "__main__":
     import unittest
