@@ -9,6 +9,8 @@ import socket
 import sys
 from pathlib import Path
 
+from one_line import plain
+
 #: what files of a kind begin with, by the ending of their names
 PICTURES = {".png": rb"\x89PNG", ".svg": rb"(?s).*<svg"}
 MOVIES = {".gif": rb"GIF8", ".mp4": rb"(?s).{4}ftyp"}
@@ -27,16 +29,24 @@ def check_place(path, kinds, reads=()):
     path = Path(path)
     if path.suffix not in kinds:
         raise Misplaced(f"{path}: expected a name that ends in {' or '.join(kinds)}")
-    if not path.exists():
-        return
+    try:
+        wrong = path.exists() and _wrong_with(path, kinds[path.suffix], reads)
+    except OSError as what:
+        wrong = f"{what.strerror or what}; expected a file that can be written"
+    if wrong:
+        raise Misplaced(f"{path}: {wrong}")
+
+
+def _wrong_with(path, kind, reads):
+    """Why what is there is not replaced; None where it is."""
     if not path.is_file():
-        raise Misplaced(f"{path}: there is a directory or a device; expected the name of a file")
+        return "there is a directory or a device; expected the name of a file"
     if any(os.path.exists(other) and os.path.samefile(path, other) for other in reads):
-        raise Misplaced(f"{path}: this file is read; expected another name for what is written")
-    own = _made_by(path) == kinds[path.suffix] if path.suffix in (".h5", ".hdf5") else re.match(kinds[path.suffix], _head(path))
+        return "this file is read; expected another name for what is written"
+    own = _made_by(path) == kind if path.suffix in (".h5", ".hdf5") else re.match(kind, _head(path))
     if not own and path.stat().st_size > 0:
-        raise Misplaced(f"{path}: there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that "
-                        "was made in the same way")
+        return "there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that was made in the same way"
+    return None
 
 
 def _head(path):
@@ -60,7 +70,7 @@ def claim(path, kinds, reads=()):
     try:
         check_place(path, kinds, reads)
     except Misplaced as refused:
-        print(f"{_program()}: error: {' '.join(str(refused).split())}", file=sys.stderr)
+        print(f"{_program()}: error: {plain(refused)}", file=sys.stderr)
         sys.exit(2)
 
 

@@ -28,9 +28,9 @@ TOOLS = {
     "blocks": ["blocks/gravier_blocks.py", "wall", "--bricks", "2", "--courses", "2", "--size", "0.2", "0.1", "--out"],
 }
 #: the tool, the name of the file, and the rest of the refusal where it is not that of a foreign file
-WRONG_ENDINGS = [(tool, name, f": expected a name that ends in {endings}") for tool, endings in
-                 (("report", ".html"), ("packing", ".png or .svg"), ("history", ".png or .svg"), ("profile", ".png or .svg"), ("tiles", ".h5"))
-                 for name in ("results/history.csv", "case.nml", "results/run.log") + ("results/results.h5",) * (tool != "tiles")]
+WRONG_ENDINGS = [("report", name, ": expected a name that ends in .html") for name in ("results/results.h5", "results/history.csv", "case.nml")] + [
+    (tool, "results/results.h5", ": expected a name that ends in .png or .svg") for tool in ("packing", "history", "profile")] + [
+    ("tiles", "results/history.csv", ": expected a name that ends in .h5")]
 FOREIGN = [("tiles", "results/results.h5"), ("report", "own.html"), ("packing", "own.png"), ("history", "own.svg"), ("movie", "own.gif"), ("profile", "own.png"),
            ("blocks", "results/history"), ("blocks", "results/trace"), ("blocks", "case")]
 STAYS = ": there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that was made in the same way"
@@ -71,7 +71,10 @@ class OwnFiles(RunTestCase):
     def test_files_of_others_stay(self):
         before = self.files()
         self.assertLess({"results/results.h5", "results/history.csv", "results/trace.csv", "results/run.log", "case.nml"}, set(before))
-        for tool, name, text in WRONG_ENDINGS + [(*one, STAYS) for one in FOREIGN] + [("tiles", "bodies.h5", ": this file is read; expected another name")]:
+        os.mkdir(os.path.join(self.work, "folder.html"))
+        places = [("tiles", "bodies.h5", ": this file is read; expected another name"), ("report", "folder.html", ": there is a directory or a device"),
+                  ("report", "a" * 300 + ".html", ": File name too long; expected a file that can be written")]
+        for tool, name, text in WRONG_ENDINGS + [(*one, STAYS) for one in FOREIGN] + places:
             with self.subTest(tool=tool, name=name):
                 done = self.tool(tool, name)
                 self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
