@@ -12,7 +12,7 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from whole_file import save_figure  # noqa: E402
+from whole_file import PICTURES, claim, save_figure  # noqa: E402
 
 # one colour a method (Okabe and Ito, safe for the colour-blind)
 STYLES = {
@@ -38,6 +38,7 @@ def main():
     parser.add_argument("profile", type=Path, metavar="FILE", help="the table")
     parser.add_argument("--out", type=Path, default=Path("fclib.png"), metavar="FIGURE", help="*.png or *.svg (fclib.png)")
     arguments = parser.parse_args()
+    claim(arguments.out, PICTURES)
 
     profile = read_profile(arguments.profile)
     ratio = profile.pop("ratio", None)

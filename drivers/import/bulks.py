@@ -3,6 +3,7 @@ import math
 
 from body_shapes import Piece
 from datbox import HULLS
+from datbox_text import ABOVE_0
 
 
 #: bulks that are rigid; what a conducting one conducts is left out
@@ -27,7 +28,8 @@ class Bulks:
         average = body.bulk.get("avrd", 0.0)
         if average > 0.0:
             volume = self.ball(average)
-        return self.density[name].get("Umas") * volume
+        # what is driven may have no mass
+        return self.density[name].within("Umas", 0.0 if body.drives else ABOVE_0) * volume
 
     def ball(self, radius):
         return math.pi * radius**2 if self.dimension == 2 else 4.0 / 3.0 * math.pi * radius**3

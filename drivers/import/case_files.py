@@ -8,8 +8,15 @@ from pathlib import Path
 
 import numpy as np
 from datbox_text import Refused
+from one_line import plain
 
-from whole_file import give_names, hdf5_file
+from whole_file import Misplaced, check_place, give_names, hdf5_file
+
+#: what its bodies files say of their origin, and the first words of its text files after the mark of a comment
+PROGRAM = "gravier_import"
+MADE = f"made by {PROGRAM} from"
+#: first line of the table of contacts, which has no comment since other programs read it
+CONTACTS = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n"
 
 
 def text_of(value):
@@ -35,7 +42,7 @@ def write_bodies(case, path):
         if grain.identifier is None:
             grain.identifier, later = later, later + 1
     spins, names = 3 * d - 3, list(case.shapes.values())
-    with hdf5_file(path) as file:
+    with hdf5_file(path, PROGRAM) as file:
         file["bodies/id"] = np.array([grain.identifier for grain in case.grains], dtype=np.int64)
         file["bodies/position"] = np.array([grain.position for grain in case.grains])
         file["bodies/radius"] = np.array([grain.radius for grain in case.grains])
@@ -55,12 +62,12 @@ def write_bodies(case, path):
 
 def texts_of(case, stem, options, contacts):
     """The text files as {ending of the name: text}, with names that begin with `stem` in the case."""
-    d, made = case.dimension, {}
+    d, made, origin = case.dimension, {}, f"{MADE} {plain(options.datbox)}\n"
     scene = {"title": f"imported from {options.datbox}", "dimension": d, "gravity": list(case.gravity[:d]), "bodies": "file",
              "bodies_file": stem + ".h5", "alert_distance": max(case.laws.used)}
     if case.shapes:
         scene["shapes"] = stem + ".shapes"
-        made[".shapes"] = "".join(f"shape {name}\n{text}" for text, name in case.shapes.items())
+        made[".shapes"] = f"# {origin}" + "".join(f"shape {name}\n{text}" for text, name in case.shapes.items())
     if options.period:
         scene["period"] = options.period
     parts = [group_text("scene", scene), *(group_text("material", {"name": name}) for name in case.laws.materials),
@@ -73,21 +80,31 @@ def texts_of(case, stem, options, contacts):
                 ",".join(repr(float(x)) for x in row) + "\n"
                 for row in np.stack([times, *(function.at(times) for function in columns.values())], axis=1))
             ending = tables.setdefault(text, f"_drive_{len(tables) + 1}.csv")
-            made[ending] = text
+            made[ending] = f"# {origin}{text}"
             keys = {**keys, "table": stem + ending}
         parts.append(group_text("boundary", keys))
     parts += [group_text("time", {"step": options.step, "steps": options.steps}),
               group_text("output", {"directory": stem + "_results", "every": max(1, options.steps // 10)})]
-    made[".nml"] = "! " + f"made by gravier_import from {options.datbox}\n" + "\n".join(parts)
+    made[".nml"] = f"! {origin}" + "\n".join(parts)
     if contacts is not None:
-        made["_contacts.csv"] = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n" + "".join(
+        made["_contacts.csv"] = CONTACTS + "".join(
             ",".join(str(cell) for cell in contact.row()) + "\n" for contact in contacts)
     return made
 
 
+def own_beginning(ending):
+    """What check_place looks for in a file of this program whose name ends so."""
+    return PROGRAM if ending == ".h5" else CONTACTS.encode() if ending == "_contacts.csv" else f"[!#] {MADE} ".encode()
+
+
 def write_files(case, stem, options, contacts):
     """Write everything into a directory beside the final names, let `gravier --check` read it there, and then give the files their names:
-    what is there is whole, and is a case. Returns the names."""
+    what is there is whole, and is a case. Returns the names. Files that are there are replaced where this program has made them."""
+    try:
+        for ending in (".h5", *texts_of(case, stem, options, contacts)):
+            check_place(stem + ending, {Path(stem + ending).suffix: own_beginning(ending)})
+    except Misplaced as refused:
+        raise Refused(f"--out {stem}: {refused}") from None
     folder, name = os.path.split(stem)
     with tempfile.TemporaryDirectory(prefix=".gravier_import-", dir=folder or ".") as draft:
         write_bodies(case, os.path.join(draft, name + ".h5"))

@@ -3,6 +3,7 @@ visibility that free bodies have part in."""
 import math
 
 from datbox import GRAINS, ROUND
+from datbox_text import ABOVE_0
 
 
 LAWS = ("IQS_CLB", "IQS_CLB_g0", "IQS_DS_CLB", "IQS_MOHR_DS_CLB", "IQS_WET_DS_CLB", "RST_CLB", "RST_DS_CLB")
@@ -12,7 +13,8 @@ class ContactLaws:
     """`materials`, `met` (keys of laws by pairs of materials) and `used` (their alert distances) of the free bodies."""
 
     def __init__(self, bodies, free, laws, sees, options, remarks):
-        self.laws, self.sees, self.slip, self.drop_g0, self.dimension = laws, sees, options.slip, options.drop_g0, bodies[0].dimension
+        self.laws, self.slip, self.drop_g0, self.dimension = laws, options.slip, options.drop_g0, bodies[0].dimension
+        self.sees = self.one_for_each_pair(sees, {self.named(contactor.words[0], contactor.words[3]) for body in free for contactor in body.contactors})
         self.remarks, self.materials, self.met, self.used = remarks, [], {}, []
         #: contactor and colour: that which stands for it, since bodies have contactors of both
         self.stands_for = {}
@@ -27,6 +29,17 @@ class ContactLaws:
     def named(kind, colour):
         """Contactor and colour, by which the table of visibility names it."""
         return {"DISKb": "DISKx", "SPHEb": "SPHER"}.get(kind, kind), colour
+
+    @staticmethod
+    def one_for_each_pair(sees, free):
+        """The table of visibility without repeats. Lines of one pair that differ are refused where a body that moves freely has part in it."""
+        found = {}
+        for pair, law, alert, see in sees:
+            _, older, distance, first = found.setdefault(frozenset(pair), (pair, law, alert, see))
+            if (older, distance) != (law, alert) and pair & free:
+                see.refuse(f"{' and '.join(' '.join(thing) for thing in sorted(pair))} with law {law} and alert= {alert:g}, and with law {older} and "
+                           f"alert= {distance:g} on line {first.line}", "one $seety for a pair")
+        return list(found.values())
 
     def thing(self, contactor):
         """Contactor and colour, or those that stand for them."""
@@ -93,9 +106,9 @@ class ContactLaws:
             entry.refuse(f"law {name}", f"one of {', '.join(LAWS)}")
         keys = self.friction_of(entry, name)
         if name.startswith("RST"):
-            keys.update(restitution=entry.get("rstn"), tangential_restitution=entry.get("rstt"))
+            keys.update(restitution=entry.within("rstn", most=1.0), tangential_restitution=entry.within("rstt", most=1.0))
         if name == "IQS_WET_DS_CLB":
-            return {"kind": "adhesive", **keys, "adhesion": entry.get("cohn"), "adhesion_range": min(entry.get("Wthk"), alert)}
+            return {"kind": "adhesive", **keys, "adhesion": entry.within("cohn"), "adhesion_range": min(entry.within("Wthk", ABOVE_0), alert)}
         if name == "IQS_MOHR_DS_CLB":
             return {"kind": "bonded", **keys, **self.bond_of(entry, alert, pair)}
         return {"kind": "velocity" if "slip_scale" in keys else "coulomb", **keys}
@@ -107,8 +120,8 @@ class ContactLaws:
         if name == "IQS_CLB_g0":
             self.remarks.append(f"law {entry.words[0]} IQS_CLB_g0: gaps count from contact here, not from those of the start")
         if name in ("IQS_CLB", "IQS_CLB_g0", "RST_CLB"):
-            return {"friction": entry.get("fric")}
-        static, dynamic = entry.get("stfr"), entry.get("dyfr")
+            return {"friction": entry.within("fric")}
+        static, dynamic = entry.within("stfr"), entry.within("dyfr")
         if static == dynamic:
             return {"friction": static}
         if name in ("IQS_WET_DS_CLB", "IQS_MOHR_DS_CLB"):

@@ -3,12 +3,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from datbox_text import Refused, entries, number
+from datbox_text import ABOVE_0, Refused, entries, number
 
 
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
 WALLS = {"JONCx": 2, "xKSID": 2, "PLANx": 3, "DNLYC": 3}
 HULLS = {"POLYG": 2, "POLYR": 3}
+#: sizes of contactors, in their order; the others have a radius
+HALF_AXES = {"JONCx": ("axe1", "axe2"), "PLANx": ("axe1", "axe2", "axe3")}
 #: relative error of radii of gyration and moments of inertia: files have them to four digits
 ROUND = 1e-3
 
@@ -64,6 +66,7 @@ def read_bodies(path):
         elif keyword == "$blmty":
             if entry.words[0] != "PLAIN":
                 entry.refuse(f"a bulk {entry.words[0]}", "PLAIN")
+            entry.check("avrd", entry.get("avrd", 0.0))
             body.bulk = entry
         elif keyword == "$nodty":
             body.node = entry
@@ -72,6 +75,9 @@ def read_bodies(path):
             if {**GRAINS, **WALLS, **HULLS}.get(shape) != body.dimension:
                 entry.refuse(f"a contactor {shape} of a body {body.kind}",
                              "DISKx, POLYG, JONCx or xKSID of RBDY2, SPHER, POLYR, PLANx or DNLYC of RBDY3")
+            if shape not in HULLS:
+                for place, name in enumerate(HALF_AXES.get(shape, ["byrd"]), 1):
+                    entry.check(name, entry.size(place, name), ABOVE_0)
             body.contactors.append(entry)
     for body in bodies:
         for what, there in (("$blmty", body.bulk), ("$nodty", body.node), ("$tacty", body.contactors)):
@@ -84,6 +90,13 @@ def read_bodies(path):
     return bodies
 
 
+def put_once(found, entry):
+    """Put a material or a law under its nickname. One that is there already has to be the same."""
+    older = found.setdefault(entry.words[0], entry)
+    if (older.words, older.values) != (entry.words, entry.values):
+        entry.refuse(f"{entry.words[0]} differs from line {older.line}, where it is too", "each name once")
+
+
 def read_bulk(path):
     """Density by nickname, and gravity (3)."""
     density, gravity = {}, None
@@ -91,7 +104,7 @@ def read_bulk(path):
         if keyword == "$gravy" and "grv1" in entry.values:
             gravity = entry.vector("grv", 3)
         if keyword == "$behav" and len(entry.words) > 1 and entry.words[0] != "lawty":
-            density[entry.words[0]] = entry
+            put_once(density, entry)
     if gravity is None:
         raise Refused(f"{path}: no gravity: expected $gravy with grv1=, grv2=, grv3=")
     return density, gravity
@@ -102,11 +115,12 @@ def read_laws(path):
     laws, sees = {}, []
     for keyword, entry in entries(path):
         if keyword == "$behav" and len(entry.words) > 1 and entry.words[0] != "lawty":
-            laws[entry.words[0]] = entry
+            put_once(laws, entry)
         elif keyword == "$seety" and len(entry.words) >= 7 and entry.words[0] != "cdbdy":
             _, candidate, colour, law, _, antagonist, other = entry.words[:7]
             # the distance stands alone, or as alert= on the same line or on the next
             alert = number(entry.words[7]) if len(entry.words) > 7 and entry.words[7] != "alert" else entry.get("alert")
+            entry.check("alert", alert)
             sees.append(({(candidate, colour), (antagonist, other)}, law, alert, entry))
     if not sees:
         raise Refused(f"{path}: no table of visibility: expected $seety")

@@ -37,8 +37,21 @@ class Function:
         values = (ct + amp * np.cos(omega * (times + start) + phi)) * np.minimum(1.0, rampi + ramp * (times + start))
         return Function(table=np.stack([times, values], axis=1))
 
+    def same(self, other):
+        return self.constant == other.constant and np.array_equal(*([] if one.table is None else one.table for one in (self, other)))
+
     def at(self, times):
         return np.full(len(times), self.constant) if self.table is None else np.interp(times, *self.table.T)
+
+
+def add_drive(body, entry, function):
+    """Let a component of a body be driven. A drive that it has already has to be the same."""
+    kind, component, entries_of_velocity = entry.words[0], int(entry.words[1]), 3 * body.dimension - 3
+    if not 1 <= component <= entries_of_velocity:
+        entry.refuse(f"{kind} {component} of body {body.rank}", f"a component from 1 to {entries_of_velocity}")
+    older_kind, older, first = body.drives.setdefault(component, (kind, function, entry))
+    if older_kind != kind or not older.same(function):
+        entry.refuse(f"{kind} {component} of body {body.rank} differs from line {first.line}, which drives the same component", "one drive of a component")
 
 
 def read_drives(path, bodies, start, end):
@@ -50,6 +63,6 @@ def read_drives(path, bodies, start, end):
                 entry.refuse(f"body {' '.join(entry.words[:2])}", f"a body of BODIES.DAT, {bodies[0].kind} 1 to {len(bodies)}")
             body = bodies[rank - 1]
         elif keyword == "$dofty" and entry.words and body and entry.words[0] in ("vlocy", "force"):
-            body.drives[int(entry.words[1])] = (entry.words[0], Function.of(entry, start, end), entry)
+            add_drive(body, entry, Function.of(entry, start, end))
         elif keyword == "$dofty" and entry.words and entry.words[0] not in ("numbr",) and not entry.words[0].startswith("["):
             entry.refuse(f"a driven degree of freedom {entry.words[0]}", "vlocy or force")

@@ -1,8 +1,12 @@
 """Text files of a DATBOX of LMGC90 as entries: keywords, words and values `name= number`."""
+import math
 import re
+import sys
 
 import numpy as np
 
+#: the least number above 0
+ABOVE_0 = sys.float_info.min
 
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
 OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "Weth": "Wthk",
@@ -54,6 +58,15 @@ class Entry:
             names = [name] + [older for older, newer in OLDER.items() if newer == name]
             self.refuse(f"{'=, '.join(names[:-1])}{'= or ' if names[1:] else ''}{names[-1]}= is missing", "a value")
         return default
+
+    def within(self, name, least=0.0, most=math.inf):
+        """A value from `least` on, 0 or ABOVE_0, to `most`."""
+        return self.check(name, self.get(name), least, most)
+
+    def check(self, name, value, least=0.0, most=math.inf):
+        if not (least <= value <= most and math.isfinite(value)):
+            self.refuse(f"{name}= {value:g}", f"a finite number {'>' if least else '>='} 0{f' and <= {most:g}' if most < math.inf else ''}")
+        return value
 
     def vector(self, name, count, default=None):
         """The values name1, name2, ... or name(1), name(2), ..."""

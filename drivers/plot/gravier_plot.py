@@ -19,7 +19,7 @@ from movie_file import draw_movie
 from one_line import OneLineParser
 from packing_picture import COLOURS, draw_packing
 from picture_style import PictureError
-from whole_file import save_figure
+from whole_file import PICTURES, claim, save_figure
 
 
 def refuse(message):
@@ -77,8 +77,6 @@ def parse(arguments):
 
 def check(options):
     """Refuse values of options that are no picture's."""
-    if options.out and options.kind != "movie" and options.out.suffix not in (".png", ".svg"):
-        refuse(f"--out {options.out}: expected a path that ends in .png or .svg")
     if options.kind == "movie" and not (options.every >= 1 and 0.0 < options.fps < numpy.inf):
         refuse(f"--every {options.every} --fps {options.fps:g}: expected 1 or more, and a number > 0")
     if options.kind in ("packing", "movie") and not (0.0 < options.size <= 1000.0 and numpy.isfinite(options.view).all()):
@@ -91,12 +89,14 @@ def draw(options):
     """Draw what is asked for, into --out or the first directory."""
     directories = options.directory if isinstance(options.directory, list) else [options.directory]
     sample = options.kind == "packing" and directories[0].suffix == ".h5"
+    out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{options.kind}.png")
+    if options.kind != "movie":
+        claim(out, PICTURES)
     runs = [gravier.BodiesFile(directories[0])] if sample else [gravier.Run(directory) for directory in directories]
     if options.kind in ("packing", "movie") and options.colour is None:
         options.colour = "radius" if sample else "speed"
     if options.kind in ("packing", "movie") and options.chains is None:
         options.chains = runs[0].dimension == 2
-    out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{options.kind}.png")
     if options.kind == "packing":
         save(draw_packing(runs[0], options.step, options), out, options.dpi)
     elif options.kind == "movie":

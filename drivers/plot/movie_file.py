@@ -8,7 +8,7 @@ import matplotlib.animation
 import matplotlib.pyplot as plt
 from packing_picture import draw_packing, shared_frame
 from picture_style import PictureError
-from whole_file import save_figure, written
+from whole_file import MOVIES, claim, save_figure, written
 
 
 def draw_movie(run, options):
@@ -18,7 +18,9 @@ def draw_movie(run, options):
         raise PictureError(f"{out}: no program ffmpeg; expected a movie .gif, or a directory for frames")
     if out.suffix in (".avi", ".mkv", ".mov", ".webm"):
         raise PictureError(f"{out}: expected a movie .gif or .mp4, or a directory for frames")
-    movie = out.suffix in (".gif", ".mp4")
+    movie = out.suffix in MOVIES
+    if movie:
+        claim(out, MOVIES)
     try:
         (out.parent if movie else out).mkdir(parents=True, exist_ok=True)
     except OSError as reason:
@@ -45,7 +47,7 @@ def join_frames(paths, out, fps):
     image = figure.figimage(first)
     play = matplotlib.animation.FuncAnimation(figure, lambda k: [image.set_data(plt.imread(paths[k]))], frames=len(paths))
     try:
-        with written(out) as part:
+        with written(out, MOVIES) as part:
             play.save(part, writer="ffmpeg" if out.suffix == ".mp4" else "pillow", fps=fps)
     except subprocess.CalledProcessError as reason:
         raise PictureError(f"{out}: ffmpeg ended with status {reason.returncode}; expected a movie .gif, or a directory for frames") from None

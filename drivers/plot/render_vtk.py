@@ -6,13 +6,15 @@ import sys
 from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
 from palette import CHAINS, SHADES  # noqa: E402
-from whole_file import whole_file  # noqa: E402
+from whole_file import PICTURES, claim, written  # noqa: E402
 
 try:
     import vtk
 except ImportError as missing:
     sys.exit(f"render_vtk.py: {missing}; expected a python3 with vtk (pip install vtk)")
 
+#: what a picture begins with
+PICTURE = {".png": PICTURES[".png"]}
 #: longer side of the picture, and the width of the legend beside it, in points
 LONGER, LEGEND = 900, 150
 #: shorter side at least
@@ -250,6 +252,7 @@ def main():
     parser.add_argument("--colour", default="velocity", metavar="FIELD", help="of the grains (velocity)")
     parser.add_argument("--opacity", type=float, help="of the grains (0.35; 1 in 2D)")
     options = parser.parse_args()
+    claim(options.out, PICTURE)
 
     bodies, contacts = (read(options.directory / name, options.time) for name in ("bodies.vtkhdf", "contacts.vtkhdf"))
     flat, shaped = bodies.GetBounds()[4] == bodies.GetBounds()[5], bodies.GetNumberOfPolys() > 0
@@ -287,7 +290,7 @@ def main():
     grab.SetInput(window)
     writer = vtk.vtkPNGWriter()
     writer.SetInputConnection(grab.GetOutputPort())
-    with whole_file(options.out) as part:
+    with written(options.out, PICTURE) as part:
         writer.SetFileName(str(part))
         writer.Write()
     print(options.out)

@@ -1,12 +1,81 @@
-"""Files that are written aside and take their name when they are whole: whatever happens meanwhile, an older one stays. And the lock by
-which one program at a time writes a file, that of modules/io/files/output_lock.f90."""
+"""Files that are written aside and take their name when they are whole: whatever happens meanwhile, an older one stays. Which files a program
+may write. And the lock by which one program at a time writes a file, that of modules/io/files/output_lock.f90."""
 import contextlib
 import errno
 import fcntl
 import os
+import re
 import socket
 import sys
 from pathlib import Path
+
+from one_line import plain
+
+#: what files of a kind begin with, by the ending of their names
+PICTURES = {".png": rb"\x89PNG", ".svg": rb"(?s).*<svg"}
+MOVIES = {".gif": rb"GIF8", ".mp4": rb"(?s).{4}ftyp"}
+#: bytes in which the beginning of a file is looked for
+HEAD = 4096
+
+
+class Misplaced(Exception):
+    """A file that a program may not write: one line."""
+
+
+def check_place(path, kinds, reads=()):
+    """Raise Misplaced unless a program may write `path`: the name has the ending of what is written, it is none of the files that the program
+    `reads`, and a file that is there is empty or one of those that the program makes. `kinds` says by the ending what these begin with; of
+    an HDF5 file it is the name of the program, which is the attribute `made_by`."""
+    path = Path(path)
+    if path.suffix not in kinds:
+        raise Misplaced(f"{path}: expected a name that ends in {' or '.join(kinds)}")
+    try:
+        wrong = path.exists() and _wrong_with(path, kinds[path.suffix], reads)
+    except OSError as what:
+        wrong = f"{what.strerror or what}; expected a file that can be written"
+    if wrong:
+        raise Misplaced(f"{path}: {wrong}")
+
+
+def _wrong_with(path, kind, reads):
+    """Why what is there is not replaced; None where it is."""
+    if not path.is_file():
+        return "there is a directory or a device; expected the name of a file"
+    if any(os.path.exists(other) and os.path.samefile(path, other) for other in reads):
+        return "this file is read; expected another name for what is written"
+    own = _made_by(path) == kind if path.suffix in (".h5", ".hdf5") else re.match(kind, _head(path))
+    if not own and path.stat().st_size > 0:
+        return "there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that was made in the same way"
+    return None
+
+
+def _head(path):
+    with open(path, "rb") as file:
+        return file.read(HEAD)
+
+
+def _made_by(path):
+    """The program that has made an HDF5 file, as it says itself; None where it does not."""
+    import h5py
+
+    try:
+        with h5py.File(path) as file:
+            return file.attrs.get("made_by")
+    except OSError:
+        return None
+
+
+def claim(path, kinds, reads=()):
+    """check_place for a program, which ends with one line and status 2 where it may not write `path`."""
+    try:
+        check_place(path, kinds, reads)
+    except Misplaced as refused:
+        print(f"{_program()}: error: {plain(refused)}", file=sys.stderr)
+        sys.exit(2)
+
+
+def _program():
+    return Path(sys.argv[0]).name.removesuffix(".py")
 
 
 @contextlib.contextmanager
@@ -69,27 +138,30 @@ def output_lock(path, program):
 
 
 @contextlib.contextmanager
-def written(path):
-    """A path to write to, as whole_file has it, in a directory that is made if need be; what the system refuses ends the program with
-    one line: status 2 where there is no such place, 4 else, as on a full disk."""
+def written(path, kinds, reads=()):
+    """A path to write to, as whole_file has it, in a directory that is made if need be. What `claim` or the system refuses ends the program
+    with one line: status 2 where there is no such place, 4 else, as on a full disk."""
+    claim(path, kinds, reads)
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part:
             yield part
     except OSError as what:
-        print(f"{Path(sys.argv[0]).name.removesuffix('.py')}: error: {path}: {' '.join(str(what.strerror or what).split())}; expected a file that "
+        print(f"{_program()}: error: {path}: {' '.join(str(what.strerror or what).split())}; expected a file that "
               "can be written", file=sys.stderr)
         nowhere = isinstance(what, (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError))
         sys.exit(2 if nowhere else 4)
 
 
 @contextlib.contextmanager
-def hdf5_file(path):
+def hdf5_file(path, program=None):
     """An HDF5 file to fill in, which is in memory and goes to `path` at the end: HDF5 itself can neither close nor forget a file whose
-    headers find no room on the disk, and crashes."""
+    headers find no room on the disk, and crashes. `program` is its attribute `made_by`, for check_place."""
     import h5py
 
     with h5py.File(path, "w", driver="core", backing_store=False) as file:
+        if program:
+            file.attrs["made_by"] = program
         yield file
         file.flush()
         image = file.id.get_file_image()
@@ -98,5 +170,5 @@ def hdf5_file(path):
 
 def save_figure(figure, path, **options):
     """Save a figure of matplotlib, or end the program with one line that says why not."""
-    with written(path) as part:
+    with written(path, PICTURES) as part:
         figure.savefig(part, **options)

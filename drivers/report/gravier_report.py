@@ -21,8 +21,11 @@ import verdict  # noqa: E402
 from asked import asked_rows, key_reference  # noqa: E402
 from one_line import OneLineParser, plain  # noqa: E402
 from run_log import STATUSES, RunLog  # noqa: E402
-from whole_file import written  # noqa: E402
+from whole_file import claim, written  # noqa: E402
 
+#: end of the title of a page, and what a page begins with up to there
+TITLE = "report of a run of Gravier"
+PAGES = {".html": rb"(?si)<!doctype html>.*<title>[^<]*" + TITLE.encode() + b"</title>"}
 #: warnings that are shown
 MOST_WARNINGS = 40
 
@@ -162,7 +165,7 @@ def report(folder):
     sections = [("verdict", "", head + verdict_section(folder)), ("asked", "What was asked", asked_section(folder)),
                 ("pictures", "Pictures", pictures_section(folder)), ("curves", "Curves", curves_section(folder)),
                 ("time", "Where the time went", time_section(folder)), ("warnings", "Warnings", warnings_section(folder))]
-    return page.page(f"{title}: report of a run of Gravier", sections)
+    return page.page(f"{title}: {TITLE}", sections)
 
 
 def main(arguments=None):
@@ -171,13 +174,14 @@ def main(arguments=None):
     parser.add_argument("-o", "--out", type=Path, metavar="FILE", help="the page (report.html in OUT)")
     options = parser.parse_args(arguments)
     plt.rcParams.update({"font.size": 9})
+    out = options.out or options.directory / "report.html"
+    claim(out, PAGES)
     try:
         text = report(Folder(options.directory))
     except gravier.ResultsError as reason:
         print(f"gravier_report: error: {plain(reason)}", file=sys.stderr)
         return 2
-    out = options.out or options.directory / "report.html"
-    with written(out) as part:
+    with written(out, PAGES) as part:
         part.write_text(text, encoding="utf-8")
     print(out)
     return 0

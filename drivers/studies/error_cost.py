@@ -1,7 +1,10 @@
 """Part of study_error.py: what a cold start of packings of several heights costs, by the program and by sweeps with momentum alone."""
 import h5py
 import numpy as np
-from study_support import gravier, lattice, run, write_hdf5, write_measured
+from study_support import lattice, run, write_hdf5, write_measured
+
+# study_support names the place of the package
+from gravier.case import write_case
 
 #: true velocity error [g h] that a solve has to reach
 GOAL = 0.1
@@ -66,7 +69,7 @@ def study_cost(out, heights, across, diameter, step, measure):
           f"{'estimate':>10}{'known to':>10}")
     rows, failures, costs = [], [], {}
     for height, place in packings(out, heights, across, diameter, step).items():
-        (place / "case.nml").write_text(gravier.namelist(case(across * diameter, diameter, step)), encoding="utf-8")
+        write_case(case(across * diameter, diameter, step), place)
         found = measure(f"height {height}", place, ["--iterations", ",".join(map(str, LOOKS)), "--situations", "cold,program", "--limit",
                                                    "3000", "--sweeps", "4000"])
         alone = [row for row in found if row["situation"] == "zero impulses"]

@@ -14,7 +14,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from whole_file import hdf5_file, written  # noqa: E402
+from whole_file import claim, hdf5_file, written  # noqa: E402
+
+PROGRAM = "tile_bodies"
+KINDS = {".h5": PROGRAM}
 
 
 def main():
@@ -24,6 +27,7 @@ def main():
     parser.add_argument("--copies", type=int, nargs="+", default=[1], help="along x, and along y")
     parser.add_argument("--keep", type=int, help="bodies of one copy")
     options = parser.parse_args()
+    claim(options.target, KINDS, [options.source])
     with h5py.File(options.source) as file:
         bodies = {name: data[:] for name, data in file["bodies"].items()}
         walls = {name: data[:] for name, data in file["walls"].items()}
@@ -35,7 +39,7 @@ def main():
     width = np.array([spread(walls, axis, number) for axis, number in enumerate(along)])
     n, copies = len(bodies["id"]), along[0] * along[1]
     walls["id"] = np.arange(copies * n + 1, copies * n + 1 + len(walls["id"]))
-    with written(options.target) as part, hdf5_file(part) as file:
+    with written(options.target, KINDS, [options.source]) as part, hdf5_file(part, PROGRAM) as file:
         for name, data in walls.items():
             file[f"walls/{name}"] = data
         for name, data in bodies.items():

@@ -103,6 +103,14 @@ class Jobs(RunTestCase):
             with open(os.path.join(self.work, f"sweep_{k}.job.nml"), encoding="utf-8") as file:
                 self.assertIn(f"friction = {mu}", file.read())
             self.assertEqual(len(read_csv(os.path.join(self.work, f"sweep_{k}", "history.csv"))["step"]), 3)
+        # the case of a row is written anew, a file of the user's own is not: no row runs
+        self.assertEqual(self.sh("gravier_job", "--list", "list.csv", "--row", "1", "sweep.nml").returncode, 0)
+        own = write(os.path.join(self.work, "sweep_3.nml"), "! mine\n")
+        done = self.sh("gravier_job", "--list", "list.csv", "--fresh", "sweep.nml")
+        self.assertEqual((done.returncode, done.stderr), (2, "gravier_job: error: sweep_3.nml: there is a file that gravier_job has not made, which is not "
+                                                             "replaced; expected a template of another name\n"))
+        with open(own, encoding="utf-8") as file:
+            self.assertEqual(file.read(), "! mine\n")
 
     def test_without_a_scheduler_it_goes_on_by_itself(self):
         write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 80}}))

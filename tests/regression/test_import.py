@@ -647,6 +647,7 @@ class Import(RunTestCase):
         cluster = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05)), ("DISKx", "REDxx", values(byrd=0.05))])
         flat = LAW + SEE.format("RBDY2", "POLYG", "BLUEx", "POLYG", "BLUEx") + SEE.format("RBDY2", "POLYG", "BLUEx", "JONCx", "WALLx")
         good = {"bodies": disk + wall, "laws": laws, "drives": still(2, 2)}
+        bulk, slippery = BULK.format(real(-G), real(0.0)), LAW.replace("iqsc0", "slips").replace("0.3", "0.1")
         cases = [
             ({"bodies": disk.replace("RBDY2", "MAILx")}, ("BODIES.DAT: line 3", "MAILx", "rigid bodies")),
             ({"bodies": polygon + wall, "laws": flat}, ("BODIES.DAT: line 9", "POLYG with nb_vertex= 4 and 0 lines of coo1= to coo2=")),
@@ -669,6 +670,26 @@ class Import(RunTestCase):
             # no word of a file steers the terminal
             ({"drives": still(2, 2).replace("vlocy      1", "vl\x1bcy      1")}, ("vl?cy", "vlocy or force")),
             ({"bulk": "$behav  lawty\n stone  RIGID      Umas= 1.\n"}, ("no gravity", "$gravy")),
+            # numbers are checked where they stand
+            ({"bodies": disk.replace(values(byrd=0.05), values(byrd=-0.05)) + wall}, ("BODIES.DAT: line 9: byrd= -0.05: expected a finite number > 0",)),
+            ({"bodies": disk + wall.replace(values(axe1=0.2, axe2=0.01), values(axe1=0.2, axe2=0.0))}, ("BODIES.DAT: line 18: axe2= 0: expected a finite",)),
+            ({"bodies": disk.replace("avrd= 0.0", "avrd=-0.1") + wall}, ("BODIES.DAT: line 5: avrd= -0.1: expected a finite number >= 0",)),
+            ({"bulk": bulk.replace("0.25", "-.25")}, ("BULK_BEHAV.DAT: line 6: Umas= -2500: expected a finite number > 0",)),
+            ({"bulk": bulk.replace("0.25", "0.00")}, ("BULK_BEHAV.DAT: line 6: Umas= 0: expected a finite number > 0",)),
+            ({"laws": laws.replace("fric= 0.3", "fric=-0.3")}, ("TACT_BEHAV.DAT: line 2: fric= -0.3: expected a finite number >= 0",)),
+            ({"laws": laws.replace("IQS_CLB", "RST_CLB").replace(LAW[-5:], LAW[-5:-1] + "  " + values(rstn=1.5, rstt=0.0) + "\n", 1)},
+             ("TACT_BEHAV.DAT: line 2: rstn= 1.5: expected a finite number >= 0 and <= 1",)),
+            ({"laws": laws.replace("0.2000000D-02", "-.2000000D-02", 1)}, ("TACT_BEHAV.DAT: line 5: alert= -0.002: expected a finite number >= 0",)),
+            # what is said twice is the same
+            ({"laws": laws + slippery + SEE.format("RBDY2", "JONCx", "WALLx", "DISKx", "BLUEx").replace("iqsc0", "slips")},
+             ("TACT_BEHAV.DAT: line 13: DISKx BLUEx and JONCx WALLx with law slips", "with law iqsc0 and alert= 0.002 on line 8: expected one $seety")),
+            ({"laws": laws + LAW.replace("0.3", "0.4")}, ("TACT_BEHAV.DAT: line 10: iqsc0 differs from line 2, where it is too: expected each name once",)),
+            ({"bulk": bulk + "$behav  lawty\n stone  RIGID      Umas= 1.\n"}, ("BULK_BEHAV.DAT: line 8: stone differs from line 6",)),
+            ({"drives": still(2, 2) + drive(2, 2, [("vlocy", 1, 0.7, 0.0, 0.0, 0.0, 1.0, 0.0)])},
+             ("DRV_DOF.DAT: line 16: vlocy 1 of body 2 differs from line 7, which drives the same component: expected one drive",)),
+            ({"drives": still(2, 2) + drive(2, 2, [("force", 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])}, ("DRV_DOF.DAT: line 16: force 1 of body 2 differs",)),
+            ({"drives": still(2, 2) + drive(2, 2, [("vlocy", 4, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])},
+             ("DRV_DOF.DAT: line 16: vlocy 4 of body 2: expected a component from 1 to 3",)),
             ({"contacts": "$icdan  DKDKx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      9  DISKx      1\n"},
              ("Vloc_Rloc.INI: line 3", "bodies 1 and 9")),
             ({"bodies": "nothing\n"}, ("no body", "$bdyty")),
@@ -682,6 +703,43 @@ class Import(RunTestCase):
                 self.assertEqual(os.listdir(folder), [])
         folder, message = self.convert(self.fresh("empty"), status=2)
         self.assertIn("BODIES.DAT: no such file", message)
+        # equal repeats say nothing new, nor do lines between walls
+        twice = {"bodies": disk + wall, "laws": 2 * laws + slippery + "".join(
+            SEE.format("RBDY2", "JONCx", "WALLx", "JONCx", "WALLx").replace("iqsc0", law) for law in ("iqsc0", "slips")),
+            "drives": 2 * still(2, 2), "bulk": bulk + bulk[bulk.index("$behav"):]}
+        made = [self.case_of(self.convert(self.box(2, **files))[0]) for files in (good, twice)]
+        self.assertEqual(*(text[text.index("  dimension"):] for text in made))
+
+    def test_files_of_others_stay(self):
+        """An import replaces the files of an import, and no other: not results, nor a case or a table of the user's own."""
+        disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+        wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        moved = drive(2, 2, [("vlocy", k, 0.0, 0.1 * (k == 1), 9.0, 0.0, 1.0, 0.0) for k in (1, 2, 3)])
+        contacts = "$icdan  DKJCx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      2  JONCx      1  noctc\n" + " " * 29 + \
+            values(n1=0.0, n2=1.0) + "\n" + " " * 29 + "gapTT " + real(0.0) + "\n"
+        box = self.box(2, disk + wall, laws, moved, contacts=contacts)
+        folder, _ = self.convert(box)
+        made = sorted(os.listdir(folder))
+        self.assertEqual(made, ["case.h5", "case.nml", "case_contacts.csv", "case_drive_1.csv"])
+        command = [sys.executable, IMPORT, box, "--step", "1e-3", "--steps", "50", "--out", "case"]
+        again = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        self.assertEqual((again.returncode, sorted(os.listdir(folder))), (0, made), again.stderr)
+        with h5py.File(os.path.join(self.scratch, "own.h5"), "w") as file:
+            file["bodies/id"] = [1]
+        with open(os.path.join(self.scratch, "own.h5"), "rb") as file:
+            image = file.read()
+        for name in made:
+            with self.subTest(name), open(os.path.join(folder, name), "rb") as file:
+                before = file.read()
+                own = write(os.path.join(folder, name), image if name == "case.h5" else b"own\n")
+                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertRegex(done.stderr, rf"\Agravier_import: error: --out case: {name}: there is a file of another kind or origin, which is not .*\n\Z")
+                with open(own, "rb") as kept:
+                    self.assertEqual(kept.read(), image if name == "case.h5" else b"own\n")
+                self.assertEqual(sorted(os.listdir(folder)), made)
+                write(own, before)
 
 
 if __name__ == "__main__":

@@ -207,6 +207,8 @@ class Package(RunTestCase):
                     pictures = np.fromfile(self.here("film.mp4"), dtype=np.uint8).reshape(2, height, width, 4)
                     self.assertGreater(min(picture[:, :, :3].std() for picture in pictures), 10.0)
                     self.assertTrue((pictures[0] != pictures[1]).any())
+                    # what the stand-in writes is no movie, and would not be replaced
+                    os.remove(self.here("film.mp4"))
                 else:
                     self.assertEqual((status, len(said.splitlines())), (2, 1), said)
                     self.assertIn("film.mp4: ffmpeg ended with status 1; expected a movie .gif", said)

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from .case import namelist
-from whole_file import give_names
+from whole_file import Misplaced, check_place, give_names
 
+#: first words of its files, after the mark of a comment
+MADE = "made by gravier_blocks"
 #: rounding of a shape by the program's own rule, over its size
 USUAL_ROUNDING = 1e-3
 
@@ -60,11 +62,18 @@ class Blocks:
                 "output": {"directory": f"{name}_results", "every": max(1, steps // 10)}}
 
     def write(self, stem, **figures):
-        """Write STEM.shapes, STEM.csv and STEM.nml; `figures` are those of `groups`. Returns the names."""
+        """Write STEM.shapes, STEM.csv and STEM.nml; `figures` are those of `groups`. Files that are there are replaced where this function has
+        made them. Returns the names."""
         folder, name = os.path.split(str(stem))
+        texts = {".shapes": f"# {MADE}\n{self.shapes_text()}", ".csv": f"# {MADE}\n{self.bodies_text()}",
+                 ".nml": f"! {MADE}\n{namelist(self.groups(name, **figures))}"}
+        try:
+            for ending in texts:
+                check_place(f"{stem}{ending}", {ending: f"[!#] {MADE}\n".encode()})
+        except Misplaced as refused:
+            raise BlocksError(str(refused)) from None
         if folder:
             os.makedirs(folder, exist_ok=True)
-        texts = {".shapes": self.shapes_text(), ".csv": self.bodies_text(), ".nml": namelist(self.groups(name, **figures))}
         with tempfile.TemporaryDirectory(prefix=".gravier_blocks-", dir=folder or ".") as draft:
             for ending, text in texts.items():
                 Path(draft, name + ending).write_text(text, encoding="utf-8")

@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
+from whole_file import Misplaced, check_place, whole_file
 
 
 class CaseError(Exception):
@@ -122,14 +123,29 @@ ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 
                "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OPENBLAS_NUM_THREADS": "1"}
 
 
+#: first line of the cases that `run` writes
+MADE = "! made by gravier.run\n"
+
+
+def write_case(groups, directory):
+    """Write `groups` as case.nml into `directory`, which is made if need be. A case.nml that is there is replaced where this function has made
+    it, or where it is the same case."""
+    case, text = Path(directory) / "case.nml", namelist(groups)
+    try:
+        if not (case.is_file() and case.read_bytes() == text.encode()):
+            check_place(case, {".nml": MADE.encode()})
+    except Misplaced as refused:
+        raise CaseError(str(refused)) from None
+    case.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(case) as part:
+        part.write_text(MADE + text, encoding="utf-8")
+
+
 def run(groups, directory, ranks=1, program=None):
-    """Write `groups` as case.nml into `directory` (made if need be) and run it there, with what it says in terminal.log. Paths
-    in a case are relative to that directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
+    """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
+    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
     directory = Path(directory)
-    directory.mkdir(parents=True, exist_ok=True)
-    # written aside: a run that begins reads a whole case
-    (directory / "case.nml.part").write_text(namelist(groups), encoding="utf-8")
-    os.replace(directory / "case.nml.part", directory / "case.nml")
+    write_case(groups, directory)
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
         done = subprocess.run([launcher, "-n", str(ranks), str(program or find_program()), "case.nml"], cwd=directory,

@@ -1,6 +1,9 @@
 """The checksums of Gravier (modules/base/numerics/random_hash.f90): of each dataset that it writes whole, as an attribute of it, and of tables in
 CSV whose first line has one."""
 import numpy as np
+from whole_file import whole_file
+
+from .case import CaseError
 
 _LOW = np.uint64(0xFFFFFFFF)
 _FACTORS = (np.uint64(0x6C62272E), np.uint64(0x5BD1E995))
@@ -49,9 +52,13 @@ def is_whole(dataset, values):
 
 def seal(path):
     """Put the checksum of a table in CSV into its first line: Gravier then refuses the file once it is damaged or changed. A table that
-    is sealed already is sealed anew."""
+    is sealed already is sealed anew. What is no table, or is a table that a run writes, is refused."""
     with open(path, "rb") as file:
-        lines = file.read().split(b"\n")
+        text = file.read()
+    wrong = "not a text" if b"\0" in text else "a table that a run writes" if text.startswith(b"step,") else None
+    if wrong:
+        raise CaseError(f"{path}: {wrong}; expected a table in CSV that a case names")
+    lines = text.split(b"\n")
     if lines[0].startswith(b"# checksum "):
         del lines[0]
     digest = np.uint64(0)
@@ -60,5 +67,5 @@ def seal(path):
         padded = line.ljust(8 * (len(line) // 8 + 1))
         words = np.append(np.frombuffer(padded, dtype=np.uint64), np.uint64(len(line)))
         digest ^= _of_rows(words[None, :], np.array([k + 3], dtype=np.uint64))
-    with open(path, "wb") as file:
-        file.write(b"\n".join([b"# checksum %016x" % int(digest), *lines]))
+    with whole_file(path) as part:
+        part.write_bytes(b"\n".join([b"# checksum %016x" % int(digest), *lines]))

@@ -1,7 +1,11 @@
 """Bodies files from states of a run, from which other runs start."""
 import numpy as np
+from whole_file import Misplaced, check_place, hdf5_file, whole_file
 
 from .results import ResultsError
+
+#: what its bodies files say of their origin
+PROGRAM = "gravier.write_bodies"
 
 
 def axes_of_contacts(normal):
@@ -38,15 +42,17 @@ def given_contacts(run, step=None):
 
 def write_bodies(run, path, step=None):
     """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
-    and periods are those of its input; walls of a bodies file are in this one."""
-    import h5py
-
+    and periods are those of its input; walls of a bodies file are in this one. A file that is there is replaced where this function has made it."""
+    try:
+        check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [run.path])
+    except Misplaced as refused:
+        raise ResultsError(str(refused)) from None
     if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
         raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
                            "&output writes such a file of the last state")
     bodies, boundaries = run.bodies(step), run.boundaries(step)
     contacts, names = given_contacts(run, step)
-    with h5py.File(path, "w") as file:
+    with whole_file(path) as part, hdf5_file(part, PROGRAM) as file:
         for name in ("id", "position", "radius", "mass", "material"):
             if name in bodies:
                 file[f"bodies/{name}"] = bodies[name]

@@ -24,23 +24,25 @@ class StaleArray(Exception):
     """An array of bodies is used after the step for which it is valid."""
 
 
+#: attributes of an array that say nothing of its values
+WITHOUT_VALUES = frozenset(("_owner", "_mark", "shape", "ndim", "size", "dtype", "itemsize", "nbytes", "flags", "__class__", "__dict__", "__len__"))
+
+
 class View(np.ndarray):
-    """Where the library keeps a field, without a copy: to be read, until the next step."""
+    """A field of bodies, in memory of its own: to be read, until the next step. numpy asks nobody before numpy.array and numpy.asarray: they
+    give the values of the step that it is of."""
 
     def __array_finalize__(self, other):
         self._owner, self._mark = getattr(other, "_owner", None), getattr(other, "_mark", None)
 
-    def _plain(self):
-        if self._owner is not None and self._owner.mark != self._mark:
-            raise StaleArray("this array of bodies is of a step that is over; expected one that is taken anew, or a copy: numpy.array(...)")
-        return self.view(np.ndarray)
+    def __getattribute__(self, name):
+        if name not in WITHOUT_VALUES:
+            _refuse_stale(self)
+        return np.ndarray.__getattribute__(self, name)
 
     def __getitem__(self, key):
-        self._plain()
+        _refuse_stale(self)
         return super().__getitem__(key)
-
-    def __iter__(self):
-        return iter(self._plain())
 
     def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
         return getattr(ufunc, method)(*(_plain(one) for one in inputs), **{key: _plain(one) for key, one in keywords.items()})
@@ -49,16 +51,39 @@ class View(np.ndarray):
         return function(*_plain(arguments), **_plain(keywords))
 
     def copy(self, order="C"):
-        return self._plain().copy(order)
+        return _plain(self).copy(order)
 
-    def __repr__(self):
-        return repr(self._plain())
+
+def _guarded(name):
+    """A special method, which Python does not look up among the attributes of an array."""
+    return lambda self, *arguments: getattr(_plain(self), name)(*_plain(arguments))
+
+
+# numpy forgets an exception within == and !=
+for _name in ("bool", "complex", "contains", "copy", "deepcopy", "eq", "float", "format", "index", "int", "iter", "ne", "reduce", "reduce_ex", "repr",
+              "str"):
+    setattr(View, f"__{_name}__", _guarded(f"__{_name}__"))
+
+
+def _refuse_stale(view):
+    owner = np.ndarray.__getattribute__(view, "_owner")
+    if owner is not None and owner.mark != np.ndarray.__getattribute__(view, "_mark"):
+        raise StaleArray("this array of bodies is of a step that is over; expected one that is taken anew, or a copy: numpy.array(...)")
+
+
+def _view(array, owner):
+    """An array as it is handed out, which is not to be written to, since nobody would notice."""
+    array.flags.writeable = False
+    view = array.view(View)
+    view._owner, view._mark = owner, owner.mark
+    return view
 
 
 def _plain(value):
     """Views in arguments as arrays of numpy."""
     if isinstance(value, View):
-        return value._plain()
+        _refuse_stale(value)
+        return np.ndarray.view(value, np.ndarray)
     if isinstance(value, (list, tuple)):
         return type(value)(_plain(one) for one in value)
     if isinstance(value, dict):
@@ -76,7 +101,10 @@ class _Memory:
 def _reals(values, what, shape=None):
     """An array of doubles, of a shape where one is asked for."""
     try:
-        found = np.array(_plain(values), dtype=np.float64, order="C", ndmin=0)
+        found = np.asarray(_plain(values))
+        if found.dtype.kind == "c":
+            raise SimulationError(f"{what}: an array of complex numbers; expected real ones")
+        found = np.array(found, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise SimulationError(f"{what}: expected numbers") from None
     if shape is not None and found.shape != shape:
@@ -85,60 +113,63 @@ def _reals(values, what, shape=None):
 
 
 class Subdomain:
-    """Bodies of a subdomain of this rank, in the order of `id`. Arrays are read where the library keeps them, until the next step; `velocity`,
-    `spin` and, with forces, `force` are set as a whole."""
+    """Bodies of a subdomain of this rank, in the order of `id`. Arrays are to be read, until the next step; `velocity`, `spin` and, with forces,
+    `force` are set as a whole."""
 
     def __init__(self, simulation, number):
         self._simulation, self._number = simulation, number
 
     def _field(self, name):
+        """A field where the library keeps it: to be copied before the library does anything else."""
         address, shape, kind = ctypes.c_void_p(), (ctypes.c_int64 * 2)(), ctypes.c_int()
         call("array", self._simulation.handle, name.encode(), self._number, ctypes.byref(address), shape, ctypes.byref(kind))
         size = (shape[0], shape[1])
         if not address.value:
             return np.zeros(size, KINDS[kind.value])
-        view = np.asarray(_Memory(address.value, size, KINDS[kind.value])).view(View)
-        view._owner, view._mark = self._simulation, self._simulation.mark
-        return view
+        return np.asarray(_Memory(address.value, size, KINDS[kind.value]))
+
+    def _copy(self, name, columns=slice(None)):
+        # whole rows are copied three times as fast as some of their columns
+        return _view(np.array(self._field(name))[:, columns], self._simulation)
 
     def _set(self, name, values):
         shape = (ctypes.c_int64 * 2)(*values.shape)
         call("set_array", self._simulation.handle, name.encode(), self._number, values.ctypes.data, shape)
 
     def __len__(self):
-        return len(self.id)
+        return len(self._field("id"))
 
     @property
     def id(self):
-        return self._field("id")[:, 0]
+        return self._copy("id", 0)
 
     @property
     def radius(self):
-        return self._field("radius")[:, 0]
+        return self._copy("radius", 0)
 
     @property
     def mass(self):
-        return self._field("mass")[:, 0]
+        return self._copy("mass", 0)
 
     @property
     def material(self):
-        return self._field("material")[:, 0]
+        return self._copy("material", 0)
 
     @property
     def glued(self):
-        return self._field("glued")[:, 0]
+        return self._copy("glued", 0)
 
     @property
     def position(self):
-        return self._field("position")
+        return self._copy("position")
 
     @property
     def orientation(self):
-        return self._field("orientation")
+        return self._copy("orientation")
 
     @property
     def velocity(self):
-        return self._field("velocity")[:, :self._simulation.dimension]
+        return self._copy("velocity", slice(None, self._simulation.dimension))
 
     @velocity.setter
     def velocity(self, values):
@@ -146,7 +177,7 @@ class Subdomain:
 
     @property
     def spin(self):
-        return self._field("velocity")[:, self._simulation.dimension:]
+        return self._copy("velocity", slice(self._simulation.dimension, None))
 
     @spin.setter
     def spin(self, values):
@@ -159,7 +190,7 @@ class Subdomain:
 
     @property
     def force(self):
-        return self._field("force")
+        return self._copy("force")
 
     @force.setter
     def force(self, values):
@@ -167,8 +198,7 @@ class Subdomain:
 
 
 class Bodies:
-    """Bodies of this rank: those of its subdomains, one after the other. With one subdomain a rank the arrays are those of the library, to be
-    read until the next step; with several they are copies. They are set in the same way."""
+    """Bodies of this rank: those of its subdomains, one after the other. Arrays are read and set in the same way."""
 
     def __init__(self, subdomains, columns):
         object.__setattr__(self, "_subdomains", subdomains)
@@ -184,7 +214,7 @@ class Bodies:
         arrays = [getattr(one, name) for one in self._subdomains]
         if not arrays:
             return np.zeros((0, self._columns[name]) if name in self._columns else 0)
-        return arrays[0] if len(arrays) == 1 else _frozen(np.concatenate(arrays))
+        return arrays[0] if len(arrays) == 1 else _view(np.concatenate(arrays), arrays[0]._owner)
 
     def __setattr__(self, name, values):
         if getattr(getattr(Subdomain, name, None), "fset", None) is None:
@@ -195,12 +225,6 @@ class Bodies:
             raise SimulationError(f"{name}: an array of shape {values.shape}; expected a row for each of the {sum(counts)} bodies of this rank")
         for one, part in zip(self._subdomains, np.split(values, np.cumsum(counts)[:-1])):
             setattr(one, name, part)
-
-
-def _frozen(array):
-    """An array that is not to be written to, since nobody would notice."""
-    array.flags.writeable = False
-    return array
 
 
 class Boundary:

@@ -1,0 +1,133 @@
+"""Tools in Python write files of their own and no other: a name has the ending of what is written, and results, cases, tables and foreign files of
+the same ending stay as they are."""
+import os
+import shutil
+import subprocess
+import sys
+import unittest
+
+import h5py
+from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, write
+
+import gravier
+from gravier import blocks
+
+CASE = {
+    "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [6, 4], "radius_min": 0.008, "radius_max": 0.012},
+    "time": {"step": 1e-3, "steps": 20},
+    "output": {"directory": "results", "every": 10, "contacts": True, "trace": True},
+}
+#: tools and what they take before the name of what they write, as an option or the last word
+TOOLS = {
+    "report": ["report/gravier_report.py", "results", "-o"],
+    "packing": ["plot/gravier_plot.py", "packing", "results", "--dpi", "50", "--out"],
+    "history": ["plot/gravier_plot.py", "history", "results", "--out"],
+    "movie": ["plot/gravier_plot.py", "movie", "results", "--size", "2", "--out"],
+    "profile": ["fclib/plot_fclib.py", "profile.csv", "--out"],
+    "tiles": ["studies/tile_bodies.py", "bodies.h5"],
+    "blocks": ["blocks/gravier_blocks.py", "wall", "--bricks", "2", "--courses", "2", "--size", "0.2", "0.1", "--out"],
+}
+#: the tool, the name of the file, and the rest of the refusal where it is not that of a foreign file
+WRONG_ENDINGS = [("report", name, ": expected a name that ends in .html") for name in ("results/results.h5", "results/history.csv", "case.nml")] + [
+    (tool, "results/results.h5", ": expected a name that ends in .png or .svg") for tool in ("packing", "history", "profile")] + [
+    ("tiles", "results/history.csv", ": expected a name that ends in .h5")]
+FOREIGN = [("tiles", "results/results.h5"), ("report", "own.html"), ("packing", "own.png"), ("history", "own.svg"), ("movie", "own.gif"), ("profile", "own.png"),
+           ("blocks", "results/history"), ("blocks", "results/trace"), ("blocks", "case")]
+STAYS = ": there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that was made in the same way"
+
+
+class OwnFiles(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.run_directory = cls.here(cls, "run")
+        gravier.run(CASE, cls.run_directory)
+        with h5py.File(os.path.join(cls.run_directory, "bodies.h5"), "w") as file:
+            file["bodies/id"], file["bodies/position"], file["bodies/radius"] = [1], [[0.1, 0.1]], [0.1]
+            file["walls/id"], file["walls/point"], file["walls/normal"] = [2], [[0.0, 0.0]], [[0.0, 1.0]]
+        write(os.path.join(cls.run_directory, "profile.csv"), "ratio,nlgs\n1,0.5\n2,1\n")
+        for name in ("own.html", "own.png", "own.svg", "own.gif"):
+            write(os.path.join(cls.run_directory, name), "mine\n")
+
+    def setUp(self):
+        self.work = self.here(self.id().split(".")[-1])
+        shutil.copytree(self.run_directory, self.work)
+
+    def tool(self, name, out):
+        script, *arguments = TOOLS[name]
+        return subprocess.run([sys.executable, os.path.join(SOURCE, "drivers", script), *arguments, out], cwd=self.work,
+                              env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+
+    def files(self):
+        """What is in each file below the directory."""
+        found = {}
+        for folder, _, names in os.walk(self.work):
+            for name in names:
+                with open(os.path.join(folder, name), "rb") as file:
+                    found[os.path.relpath(os.path.join(folder, name), self.work)] = file.read()
+        return found
+
+    def test_files_of_others_stay(self):
+        before = self.files()
+        self.assertLess({"results/results.h5", "results/history.csv", "results/trace.csv", "results/run.log", "case.nml"}, set(before))
+        os.mkdir(os.path.join(self.work, "folder.html"))
+        places = [("tiles", "bodies.h5", ": this file is read; expected another name"), ("report", "folder.html", ": there is a directory or a device"),
+                  ("report", "a" * 300 + ".html", ": File name too long; expected a file that can be written")]
+        for tool, name, text in WRONG_ENDINGS + [(*one, STAYS) for one in FOREIGN] + places:
+            with self.subTest(tool=tool, name=name):
+                done = self.tool(tool, name)
+                self.assertEqual((done.returncode, done.stdout), (2, ""), done.stderr)
+                ending = {"results/history": ".csv", "results/trace": ".csv", "case": ".nml"}.get(name, "") if tool == "blocks" else ""
+                self.assertIn(f": error: {name}{ending}{text}", done.stderr)
+                self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+                self.assertEqual(self.files(), before)
+
+    def test_own_files_are_replaced(self):
+        """What a tool has made it makes anew, and an empty file is nobody's."""
+        for tool, name in (("report", "a.html"), ("packing", "a.png"), ("packing", "a.svg"), ("movie", "a.gif"), ("profile", "b.png"), ("tiles", "a.h5"),
+                           ("blocks", "wall")):
+            write(os.path.join(self.work, name if tool != "blocks" else "wall.nml"), "")
+            for time in range(2):
+                with self.subTest(tool=tool, name=name, time=time):
+                    done = self.tool(tool, name)
+                    self.assertEqual((done.returncode, done.stderr), (0, ""))
+                    self.assertGreater(os.path.getsize(os.path.join(self.work, name if tool != "blocks" else "wall.nml")), 0)
+
+    def test_functions_of_the_package(self):
+        """The same by exceptions: bodies files, cases, seals of tables and blocks."""
+        run, before = gravier.Run(os.path.join(self.work, "results")), self.files()
+        path = {name: os.path.join(self.work, name) for name in ("results/results.h5", "results/history.csv", "case.nml", "bodies.h5", "mine/case.nml")}
+        for call, error, text in (
+                (lambda: gravier.write_bodies(run, path["results/results.h5"]), gravier.ResultsError, "this file is read"),
+                (lambda: gravier.write_bodies(run, path["results/history.csv"]), gravier.ResultsError, "expected a name that ends in .h5 or .hdf5"),
+                (lambda: gravier.write_bodies(run, path["bodies.h5"]), gravier.ResultsError, "not replaced"),
+                (lambda: gravier.seal(path["results/results.h5"]), gravier.CaseError, "not a text; expected a table in CSV"),
+                (lambda: gravier.seal(path["results/history.csv"]), gravier.CaseError, "a table that a run writes"),
+                (lambda: blocks.tower(2, (0.1, 0.1)).write(os.path.join(self.work, "results/history")), blocks.BlocksError, "not replaced")):
+            with self.assertRaisesRegex(error, text) as caught:
+                call()
+            self.assertNotIn("\n", str(caught.exception))
+            self.assertEqual(self.files(), before)
+        os.mkdir(self.here("own_case"))
+        own = write(self.here("own_case", "case.nml"), "! mine\n" + gravier.namelist(CASE))
+        with self.assertRaisesRegex(gravier.CaseError, "case.nml: there is a file of another kind or origin"):
+            gravier.run(CASE, self.here("own_case"))
+        self.assertEqual(os.listdir(self.here("own_case")), ["case.nml"])
+        with open(own, encoding="utf-8") as file:
+            self.assertTrue(file.read().startswith("! mine\n"))
+        # what would be written is there already, and what was written is replaced
+        write(own, gravier.namelist(CASE))
+        self.assertEqual(gravier.run(CASE, self.here("own_case")), 0)
+        self.assertEqual(gravier.run({**CASE, "time": {"step": 1e-3, "steps": 2}}, self.here("own_case")), 0)
+        for step in (10, 20):
+            gravier.write_bodies(run, os.path.join(self.work, "state.h5"), step)
+            self.assertEqual(len(gravier.BodiesFile(os.path.join(self.work, "state.h5")).bodies().id), 24)
+        table = write(os.path.join(self.work, "pair.csv"), "time,gx,gy\n0,0,-9.81\n")
+        gravier.seal(table)
+        with open(table, encoding="ascii") as file:
+            self.assertRegex(file.read(), r"\A# checksum [0-9a-f]{16}\ntime,gx,gy\n0,0,-9\.81\n\Z")
+
+
+if __name__ == "__main__":
+    unittest.main()
