@@ -1,8 +1,11 @@
 """Memory: what `--check` expects a rank to hold at most is what runs hold, and the least that a grain takes is what it takes."""
+import os
 import re
+import subprocess
+import time
 import unittest
 
-from gravier_runs import RunTestCase, gravier, merged, namelist, run_case, write
+from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, gravier, merged, namelist, run_case, write
 
 #: grains of one radius on a lattice touch each other; of two radii most touch none
 TOUCHING, LOOSE = {"radius_min": 0.01, "radius_max": 0.01}, {"radius_min": 0.008, "radius_max": 0.012}
@@ -11,6 +14,9 @@ CASE = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, 
         "solver": {"method": "nscdd", "max_iterations": 20}, "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 0}}
 #: bytes that src/run/run_memory.f90 takes for a grain, by dimension and friction
 LEAST = {(2, 0.0): 540, (3, 0.0): 695, (2, 0.3): 655, (3, 0.3): 865}
+#: the same for a grain of a sample, by dimension, arrangement and radii
+SAMPLE_LEAST = {(2, "lattice", "uniform"): 225, (3, "lattice", "uniform"): 320, (2, "loose", "uniform"): 250, (3, "loose", "uniform"): 325,
+                (2, "loose", "single"): 350, (3, "loose", "single"): 480}
 
 
 class Memory(RunTestCase):
@@ -51,6 +57,34 @@ class Memory(RunTestCase):
                     # the log has whole MiB
                     taken = 2**20 * (held[1] - held[0]) / (grains[1] - grains[0])
                     self.assertLess(abs(taken - least), 0.03 * least + 2**21 / (grains[1] - grains[0]))
+
+    def sample_peak(self, count, dimension, arrangement, radii):
+        """[bytes] that gravier_sample held for so many grains."""
+        sizes = {"radius": 0.01} if radii == "single" else {"radius_min": 0.005, "radius_max": 0.01}
+        width = round(0.024 * count**(1 / dimension) + 0.1, 4)
+        write(self.here("sample.nml"), namelist({
+            "scene": {"bodies": "sample", "dimension": dimension}, "time": {"step": 1e-3, "steps": 0},
+            "sample": {"count": count, "arrangement": arrangement, "radii": radii, "box": [width] * (dimension - 1), "file": "grains.h5", **sizes}}))
+        held = 0
+        with subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env={**ENVIRONMENT, **os.environ},
+                              stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
+            # ru_maxrss would have the memory of this process, too, of which the program is a child
+            while program.poll() is None:
+                with open(f"/proc/{program.pid}/status", encoding="ascii") as status:
+                    peak = re.search(r"VmHWM:\s*(\d+) kB", status.read())
+                held = 1024 * int(peak[1]) if peak else held
+                time.sleep(0.005)
+        self.assertEqual(program.returncode, 0)
+        return held
+
+    def test_least_of_a_sample(self):
+        """What each grain takes beside the program itself is not below what gravier_sample refuses by, and a quarter above it at most."""
+        few, many = 1000, 300000
+        for kind, least in SAMPLE_LEAST.items():
+            with self.subTest(kind):
+                taken = (self.sample_peak(many, *kind) - self.sample_peak(few, *kind)) / (many - few)
+                self.assertGreaterEqual(taken, least)
+                self.assertLessEqual(taken, 1.25 * least)
 
 
 if __name__ == "__main__":
