@@ -1,4 +1,5 @@
 """Memory: what `--check` expects a rank to hold at most is what runs hold, and the least that a grain takes is what it takes."""
+import itertools
 import os
 import re
 import subprocess
@@ -14,9 +15,6 @@ CASE = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, 
         "solver": {"method": "nscdd", "max_iterations": 20}, "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 0}}
 #: bytes that src/run/run_memory.f90 takes for a grain, by dimension and friction
 LEAST = {(2, 0.0): 540, (3, 0.0): 695, (2, 0.3): 655, (3, 0.3): 865}
-#: the same for a grain of a sample, by dimension, arrangement and radii
-SAMPLE_LEAST = {(2, "lattice", "uniform"): 225, (3, "lattice", "uniform"): 320, (2, "loose", "uniform"): 250, (3, "loose", "uniform"): 325,
-                (2, "loose", "single"): 350, (3, "loose", "single"): 480}
 
 
 class Memory(RunTestCase):
@@ -60,11 +58,7 @@ class Memory(RunTestCase):
 
     def sample_peak(self, count, dimension, arrangement, radii):
         """[bytes] that gravier_sample held for so many grains."""
-        sizes = {"radius": 0.01} if radii == "single" else {"radius_min": 0.005, "radius_max": 0.01}
-        width = round(0.024 * count**(1 / dimension) + 0.1, 4)
-        write(self.here("sample.nml"), namelist({
-            "scene": {"bodies": "sample", "dimension": dimension}, "time": {"step": 1e-3, "steps": 0},
-            "sample": {"count": count, "arrangement": arrangement, "radii": radii, "box": [width] * (dimension - 1), "file": "grains.h5", **sizes}}))
+        self.write_sample(count, dimension, arrangement, radii)
         held = 0
         with subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env={**ENVIRONMENT, **os.environ},
                               stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
@@ -77,12 +71,28 @@ class Memory(RunTestCase):
         self.assertEqual(program.returncode, 0)
         return held
 
+    def sample_least(self, *kind):
+        """[bytes] of a grain that gravier_sample refuses by."""
+        self.write_sample(2 * 10**9, *kind)
+        run = subprocess.run(["sh", "-c", f"ulimit -v 6000000; exec {PROGRAMS}/gravier_sample sample.nml"], cwd=self.scratch,
+                             env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 4, run)
+        return float(re.search(r"2000000000 grains: at least ([\d.]+) GB of memory are needed", run.stderr)[1]) / 2
+
+    def write_sample(self, count, dimension, arrangement, radii):
+        sizes = {"radius": 0.01} if radii == "single" else {"radius_min": 0.005, "radius_max": 0.01}
+        width = round(0.024 * count**(1 / dimension) + 0.1, 4)
+        write(self.here("sample.nml"), namelist({
+            "scene": {"bodies": "sample", "dimension": dimension}, "time": {"step": 1e-3, "steps": 0},
+            "sample": {"count": count, "arrangement": arrangement, "radii": radii, "box": [width] * (dimension - 1), "file": "grains.h5", **sizes}}))
+
     def test_least_of_a_sample(self):
         """What each grain takes beside the program itself is not below what gravier_sample refuses by, and a quarter above it at most."""
         few, many = 1000, 300000
-        for kind, least in SAMPLE_LEAST.items():
-            with self.subTest(kind):
-                taken = (self.sample_peak(many, *kind) - self.sample_peak(few, *kind)) / (many - few)
+        for dimension, placing in itertools.product((2, 3), (("lattice", "uniform"), ("loose", "uniform"), ("loose", "single"))):
+            with self.subTest(dimension=dimension, placing=placing):
+                least = self.sample_least(dimension, *placing)
+                taken = (self.sample_peak(many, dimension, *placing) - self.sample_peak(few, dimension, *placing)) / (many - few)
                 self.assertGreaterEqual(taken, least)
                 self.assertLessEqual(taken, 1.25 * least)
 
