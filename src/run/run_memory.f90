@@ -15,9 +15,9 @@ module gravier_run_memory
   !> bytes of a grain that touches no other, with its copies on the way from the scene to the first step, in 2D and 3D, without spin
   !> and with it. The peaks of runs grow by 545, 702, 661 and 870 a grain (test_run_memory.py)
   integer, parameter :: run_bytes(2:3, 0:1) = reshape([540, 695, 655, 865], [2, 2])
-  !> bytes of a grain that is made and written, in 2D and 3D: in a lattice, where the file takes the most; loosely, where places that
-  !> are tried do; the same of one radius, of which all grains try places at once. Peaks are above them by 3 to 20 %, and by a third
-  !> where radii differ a lot (test_run_memory.py)
+  !> bytes of a grain that is made and written, in 2D and 3D. In a lattice its way to the file takes the most. Loosely placed grains
+  !> take more while they try places, and those of one radius, which all try at once, the most. Peaks are above these figures by
+  !> 3 to 20 %, and by a third where radii differ a lot (test_run_memory.py)
   integer, parameter :: sample_bytes(2:3, 3) = reshape([225, 320, 250, 325, 350, 480], [2, 3])
 
 contains

@@ -308,6 +308,8 @@ CSV_FILES = [
     ("plane with a zero normal", changed("plane,0.0,1.0", "plane,0.0,0.0"), ("line 6", "column nx", "not zero")),
     ("short row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9"), ("line 5", "2 cells", "header has 9")),
     ("long row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9,0.1,0.1,0.0,1.0,grain,,,"), ("line 5", "10 cells", "9")),
+    ("group of no boundary", "id,x,y,radius,group\n1,0.0,0.1,0.1,0\n2,0.3,0.1,0.1,3\n",
+     ("id 2: group 3: expected 0, or the group of a &boundary with shape = 'grains' in case.nml",)),
     ("binary", np.random.default_rng(2).bytes(3000), ()),
 ]
 
