@@ -13,6 +13,7 @@ module gravier_sample_file
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
   use gravier_run_log, only: run_log_t
+  use gravier_run_memory, only: check_written_sample
   use gravier_sample_bodies, only: make_sample
   use gravier_sample_preparation, only: prepare_sample, open_log
   implicit none
@@ -68,6 +69,8 @@ contains
     type(bodies_data_t) :: data
     type(shape_library_t) :: shapes
 
+    call check_written_sample(comm, config, error)
+    if (allocated(error)) return
     if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, shapes, error)
     if (allocated(error)) return
     call make_sample(comm, config, shapes, data, error)

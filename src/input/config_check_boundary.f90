@@ -2,8 +2,11 @@
 module gravier_config_check_boundary
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_text, only: to_text
   use gravier_surface, only: surface_t
   use gravier_surface_registry, only: glued_grains
+  use gravier_given_contacts, only: name_length
+  use gravier_boundary_forces, only: name_in_columns
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, boundary_config_t, text_length
   use gravier_config_surfaces, only: set_surface, surface_value, shapes_in
@@ -25,13 +28,18 @@ contains
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
     character(len=text_length), allocatable :: names(:)
+    character(len=name_length), allocatable :: columns(:)
     integer :: i
 
-    allocate (names(size(config%boundaries)))
+    allocate (names(size(config%boundaries)), columns(size(config%boundaries)))
     names(:) = config%boundaries%name
+    do i = 1, size(config%boundaries)
+      columns(i) = name_in_columns(trim(names(i)))
+    end do
     do i = 1, size(config%boundaries)
       report%instance = i
       call expect_own_name(report, "boundary", names(:i), error)
+      call check_columns(report, names(:i), columns(:i), error)
       call check_group(report, config%boundaries(:i), error)
       call check_shape(report, config, config%boundaries(i), error)
       call check_size(report, config%boundaries(i), error)
@@ -43,6 +51,23 @@ contains
     end do
     report%instance = 1
   end subroutine check_boundaries
+
+  !> The name of the last of some boundaries is as short as files have it, and no other name is the same in names of columns.
+  subroutine check_columns(report, names, columns, error)
+    type(report_t), intent(in) :: report
+    !> as the input has them, and as columns have them
+    character(len=*), intent(in) :: names(:), columns(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n, i
+
+    n = size(names)
+    if (len_trim(names(n)) > name_length) call expect(report, .false., "boundary", "name", error, &
+      & "at most "//to_text(name_length)//" characters, here "//to_text(len_trim(names(n))))
+    do i = 1, n - 1
+      if (columns(i) == columns(n)) call expect(report, .false., "boundary", "name", error, &
+        & "a name of its own in the columns of history.csv, but the "//ordinal(i)//" is '"//trim(columns(n))//"' there too")
+    end do
+  end subroutine check_columns
 
   !> The last of some boundaries has a group of grains of its own.
   subroutine check_group(report, boundaries, error)

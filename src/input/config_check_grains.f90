@@ -3,7 +3,7 @@ module gravier_config_check_grains
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
-  use gravier_config_names, only: count_names
+  use gravier_config_names, only: count_names, has_empty_name
   use gravier_config_types, only: config_t, grains_config_t
   use gravier_config_report, only: report_t, expect, is_given, shown_text
   implicit none
@@ -60,6 +60,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer :: n
 
+    call expect(report, .not. has_empty_name(grains%grain_shapes), group, "grain_shapes", error, &
+                "the name of a shape before and behind each comma")
     n = count_names(grains%grain_shapes)
     call expect(report, n == 0 .or. config%scene%shapes /= "", group, "grain_shapes", error, &
                 "shapes of &scene, the path of the file that has them")

@@ -137,7 +137,7 @@ contains
       text = choices_text(key%allowed)
     case default
       text = "a text in quotes"
-      if (key%count > 1) text = "at most "//to_text(key%count)//" texts in quotes"
+      if (key%count > 1) text = "at most "//to_text(key%count)//" texts in quotes, none of them empty"
       if (key%allowed /= "") text = text//", "//trim(key%allowed)
       text = text//", at most "//to_text(text_length)//" characters"
     end select

@@ -2,7 +2,7 @@
 module gravier_config_names
   implicit none
   private
-  public :: count_names, get_name
+  public :: count_names, get_name, has_empty_name
 
   character(len=*), parameter :: between = " ,"//achar(9)
 
@@ -38,6 +38,26 @@ contains
     name = ""
     if (first > 0) name = text(first:last)
   end subroutine get_name
+
+  !> Whether a comma has no name before or behind it.
+  pure logical function has_empty_name(text)
+    character(len=*), intent(in) :: text
+    logical :: named
+    integer :: i
+
+    has_empty_name = .false.
+    if (index(text, ",") == 0) return
+    named = .false.
+    do i = 1, len(text)
+      if (text(i:i) == ",") then
+        has_empty_name = has_empty_name .or. .not. named
+        named = .false.
+      else if (scan(text(i:i), between) == 0) then
+        named = .true.
+      end if
+    end do
+    has_empty_name = has_empty_name .or. .not. named
+  end function has_empty_name
 
   !> Where the next name is.
   pure subroutine find_next(text, last, first)

@@ -130,7 +130,8 @@ module gravier_config_table
            "boundary")]
 
   type(key_t), parameter :: shape_keys(*) = &
-    [key_t("boundary", "name", kind_text, "''", "not empty", "a name of its own, for messages and results", &
+    [key_t("boundary", "name", kind_text, "''", "not empty", &
+           "a name of its own, of at most 64 characters, for messages and results", &
            note="`'boundary K'`, K its number"), &
      key_t("boundary", "shape", kind_choice, "''", "", &
            "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `mesh`: facets of a file; "// &

@@ -183,7 +183,7 @@ contains
     touched(1) = .not. failed
   end subroutine read_text
 
-  !> Texts in quotes, of at most text_length characters and not empty.
+  !> Texts in quotes, of at most text_length characters, none of them empty.
   subroutine read_texts(index, value, slot, touched, failed)
     !> with its parentheses, or empty
     character(len=*), intent(in) :: index
@@ -191,15 +191,19 @@ contains
     type(slot_t), intent(inout) :: slot
     logical, intent(out) :: touched(most_entries)
     logical, intent(out) :: failed
-    character(len=longest_text) :: values(most_texts)
+    character(len=longest_text) :: values(most_texts), again(most_texts)
     integer :: status, i
 
     touched = .false.
     failed = .not. is_quoted(value)
     if (failed) return
+    values = ""
+    again = "?"
     call texts_of_record(index//" = "//value, values, status)
-    touched(:most_texts) = values /= ""
-    failed = status /= 0 .or. any(len_trim(values) > text_length) .or. .not. fits(touched, size(slot%texts))
+    if (status == 0) call texts_of_record(index//" = "//value, again, status)
+    touched(:most_texts) = values == again
+    failed = status /= 0 .or. any(len_trim(values) > text_length) .or. any(touched(:most_texts) .and. values == "") &
+      & .or. .not. fits(touched, size(slot%texts))
     if (failed) return
     do i = 1, size(slot%texts)
       if (touched(i)) slot%texts(i) = values(i) (:text_length)
@@ -274,13 +278,12 @@ contains
   subroutine texts_of_record(assignment, value, status)
     !> `(index) = values`
     character(len=*), intent(in) :: assignment
-    character(len=longest_text), intent(out) :: value(most_texts)
+    character(len=longest_text), intent(inout) :: value(most_texts)
     !> not 0: it is not a list of texts
     integer, intent(out) :: status
     character(len=:), allocatable :: record
     namelist /one/ value
 
-    value = ""
     record = "&one value"//assignment//" /"
     read (record, nml=one, iostat=status)
     if (status /= 0) call forget_failed_read()

@@ -29,12 +29,14 @@ contains
     integer(i8) :: last_id
     integer :: w, b, nd
 
+    call check_wall_names(config, data, error)
+    if (allocated(error)) return
     nd = config%scene%dimension
     allocate (boundaries(data%n_walls + size(config%boundaries)))
     do w = 1, data%n_walls
       associate (wall => boundaries(w))
         wall%id = data%wall_id(w)
-        wall%name = "wall "//to_text(data%wall_id(w))
+        wall%name = wall_name(data%wall_id(w))
         call make_surface("plane", wall%surface)
         wall%surface%point(1:nd) = data%wall_point(:, w)
         wall%pivot(:) = wall%surface%point
@@ -63,6 +65,31 @@ contains
       if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
+
+  !> The name of a wall of a bodies file, a lattice or a sample.
+  pure function wall_name(id) result(name)
+    integer(i8), intent(in) :: id
+    character(len=:), allocatable :: name
+
+    name = "wall "//to_text(id)
+  end function wall_name
+
+  !> Refuse a boundary with the name of a wall, which the walls of all ranks have.
+  subroutine check_wall_names(config, data, error)
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(in) :: data
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
+    integer :: w, b
+
+    do w = 1, data%n_walls
+      name = wall_name(data%wall_id(w))
+      do b = 1, size(config%boundaries)
+        if (config%boundaries(b)%name == name) call raise(error, status_input, config%file//": &boundary name = '"//name// &
+          & "': expected a name of its own, but the wall "//to_text(data%wall_id(w))//" of the scene has it too")
+      end do
+    end do
+  end subroutine check_wall_names
 
   !> Read the facets of a boundary. Failures (status_input): as of read_mesh; no facet with an area or, in 2D, a length.
   subroutine read_facets(path, nd, boundary, error)

@@ -1,8 +1,12 @@
 """Memory: what `--check` expects a rank to hold at most is what runs hold, and the least that a grain takes is what it takes."""
+import itertools
+import os
 import re
+import subprocess
+import time
 import unittest
 
-from gravier_runs import RunTestCase, gravier, merged, namelist, run_case, write
+from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, gravier, merged, namelist, run_case, write
 
 #: grains of one radius on a lattice touch each other; of two radii most touch none
 TOUCHING, LOOSE = {"radius_min": 0.01, "radius_max": 0.01}, {"radius_min": 0.008, "radius_max": 0.012}
@@ -51,6 +55,46 @@ class Memory(RunTestCase):
                     # the log has whole MiB
                     taken = 2**20 * (held[1] - held[0]) / (grains[1] - grains[0])
                     self.assertLess(abs(taken - least), 0.03 * least + 2**21 / (grains[1] - grains[0]))
+
+    def sample_peak(self, count, dimension, arrangement, radii):
+        """[bytes] that gravier_sample held for so many grains."""
+        self.write_sample(count, dimension, arrangement, radii)
+        held = 0
+        with subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env={**ENVIRONMENT, **os.environ},
+                              stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
+            # ru_maxrss would have the memory of this process, too, of which the program is a child
+            while program.poll() is None:
+                with open(f"/proc/{program.pid}/status", encoding="ascii") as status:
+                    peak = re.search(r"VmHWM:\s*(\d+) kB", status.read())
+                held = 1024 * int(peak[1]) if peak else held
+                time.sleep(0.005)
+        self.assertEqual(program.returncode, 0)
+        return held
+
+    def sample_least(self, *kind):
+        """[bytes] of a grain that gravier_sample refuses by."""
+        self.write_sample(2 * 10**9, *kind)
+        run = subprocess.run(["sh", "-c", f"ulimit -v 6000000; exec {PROGRAMS}/gravier_sample sample.nml"], cwd=self.scratch,
+                             env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        self.assertEqual(run.returncode, 4, run)
+        return float(re.search(r"2000000000 grains: at least ([\d.]+) GB of memory are needed", run.stderr)[1]) / 2
+
+    def write_sample(self, count, dimension, arrangement, radii):
+        sizes = {"radius": 0.01} if radii == "single" else {"radius_min": 0.005, "radius_max": 0.01}
+        width = round(0.024 * count**(1 / dimension) + 0.1, 4)
+        write(self.here("sample.nml"), namelist({
+            "scene": {"bodies": "sample", "dimension": dimension}, "time": {"step": 1e-3, "steps": 0},
+            "sample": {"count": count, "arrangement": arrangement, "radii": radii, "box": [width] * (dimension - 1), "file": "grains.h5", **sizes}}))
+
+    def test_least_of_a_sample(self):
+        """What each grain takes beside the program itself is not below what gravier_sample refuses by, and a quarter above it at most."""
+        few, many = 1000, 300000
+        for dimension, placing in itertools.product((2, 3), (("lattice", "uniform"), ("loose", "uniform"), ("loose", "single"))):
+            with self.subTest(dimension=dimension, placing=placing):
+                least = self.sample_least(dimension, *placing)
+                taken = (self.sample_peak(many, dimension, *placing) - self.sample_peak(few, dimension, *placing)) / (many - few)
+                self.assertGreaterEqual(taken, least)
+                self.assertLessEqual(taken, 1.25 * least)
 
 
 if __name__ == "__main__":

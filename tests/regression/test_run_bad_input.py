@@ -140,6 +140,15 @@ FILES = [
     ("a group of two boundaries", bodies_case("bodies.csv", boundary=[{"name": name, "shape": "grains", "group": group}
                                                                       for name, group in (("a", 2), ("b", 3), ("c", 2))]),
      ("&boundary (the 3rd, 'c') group = 2", "a group of its own, but the 1st has it too")),
+    # names that are the same in the columns of history.csv, and those of walls
+    *(("boundaries " + " and ".join(names), case({"boundary": [{**PLANE, "name": name} for name in names]}), words) for names, words in (
+        (("a,b", "a_b"), ("&boundary (the 2nd, 'a_b') name = 'a_b'", "in the columns of history.csv, but the 1st is 'a_b' there too")),
+        (("floor", "wall 31"), ("&boundary name = 'wall 31': expected a name of its own, but the wall 31 of the scene has it too",)),
+        (("n"*65,), ("name = '" + "n"*65 + "': expected at most 64 characters, here 65",)))),
+    # a list of names with an empty one
+    *((f"law of {materials}", f"{GOOD}&material name = 'a' /\n&law materials = {materials}, kind = 'none' /\n",
+       (f"&law (the 1st) materials = {materials}: expected at most 2 texts in quotes, none of them empty",))
+      for materials in ("'a', ''", "'', 'a'", "''")),
     *(boundary_key(name, value, *words, also=also) for name, value, words, also in (
         ("force", "0, 1", ("0 along each component that is not free",), {**PLANE, "free": [True, False], "mass": 1.0}),
         ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
@@ -299,6 +308,8 @@ CSV_FILES = [
     ("plane with a zero normal", changed("plane,0.0,1.0", "plane,0.0,0.0"), ("line 6", "column nx", "not zero")),
     ("short row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9"), ("line 5", "2 cells", "header has 9")),
     ("long row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9,0.1,0.1,0.0,1.0,grain,,,"), ("line 5", "10 cells", "9")),
+    ("group of no boundary", "id,x,y,radius,group\n1,0.0,0.1,0.1,0\n2,0.3,0.1,0.1,3\n",
+     ("id 2: group 3: expected 0, or the group of a &boundary with shape = 'grains' in case.nml",)),
     ("binary", np.random.default_rng(2).bytes(3000), ()),
 ]
 

@@ -67,7 +67,7 @@ class Departures(LoopTestCase):
         return table
 
     def test_lists_last(self):
-        """Grains leave in many steps, of which few make lists; each leaves at the end of the step in whose middle it is behind."""
+        """Grains leave in many steps, of which few make lists; each leaves in the step in whose middle it is behind."""
         table = self.fall("straight", STEPS).history()
         leaving = table["left"] > 0
         self.assertGreater(leaving.sum(), 15)
@@ -76,6 +76,46 @@ class Departures(LoopTestCase):
         self.assertGreater(table["contacts"].max(), 20)
         self.assertEqual(table["left"][2], 1)
         self.assertTrue((COUNT[0] * COUNT[1] + 1 - np.cumsum(table["left"]) == table["grains"]).all())
+
+    def test_moment(self):
+        """Disks that pass the outlet before and after the place (1 - theta) h of a step leave in this step and in the next; their energy
+        is that of the end of the step before."""
+        for theta, left in ((0.5, [2, 1, 0]), (0.75, [1, 2, 0]), (1.0, [0, 3, 0])):
+            for ranks in (1, 2):
+                with self.subTest(theta=theta, ranks=ranks):
+                    directory = self.here(f"moment {theta} {ranks}")
+                    os.makedirs(directory)
+                    # ways of 1 mm in a step
+                    write(os.path.join(directory, "grains.csv"), "id,x,y,radius,vy,mass\n1,0,0.0002,0.01,-1,2\n2,1,0.0004,0.01,-1,2\n"
+                          "3,2,0.0009,0.01,-1,2\n4,3,0.5,0.01,0,2\n")
+                    run = run_case({**FALL, "boundary": [{"name": "out", "shape": "outlet", "normal": [0.0, 1.0]}],
+                                    "time": {"step": 1e-3, "steps": 3, "theta": theta}, "decomposition": {"subdomains": 2},
+                                    "output": {"every": 1, "energy": True}}, ranks, directory)
+                    self.assert_status(run, 0)
+                    table = run.history()
+                    self.assertEqual(table["left"].tolist(), left)
+                    self.assertEqual(table["grains"].tolist(), (4 - np.cumsum(left)).tolist())
+                    np.testing.assert_allclose(table["carried_away"], np.cumsum(left), rtol=1e-12)
+
+    def test_boundary_that_is_removed(self):
+        """It stays in tables with a force of 0, and moves on as its drive says; one at rest stays where it was."""
+        directory = self.here("gate")
+        os.makedirs(directory)
+        write(os.path.join(directory, "grains.csv"), "id,x,y,radius\n1,0,0.01,0.01\n2,1,0.01,0.01\n")
+        gate = {"shape": "plane", "normal": [0.0, 1.0], "remove_at": 0.002}
+        run = run_case({**FALL, "scene": {**FALL["scene"], "gravity": [0.0, -10.0]},
+                        "boundary": [{**gate, "name": "up", "velocity": [0.0, 0.1]}, {**gate, "name": "still"}],
+                        "time": {"step": 1e-3, "steps": 4}, "output": {"every": 1, "boundary_forces": True}}, 1, directory)
+        self.assert_status(run, 0)
+        table = run.history()
+        np.testing.assert_allclose(table["position_y:up"], [1e-4, 2e-4, 3e-4, 4e-4], rtol=1e-12)
+        self.assertEqual(table["position_y:still"].tolist(), [0.0] * 4)
+        self.assertTrue((table["force_y:up"][:2] + table["force_y:still"][:2] < 0).all())
+        states = run.results()
+        for step in (3, 4):
+            self.assertEqual((table["force_y:up"][step - 1], table["force_y:still"][step - 1]), (0.0, 0.0))
+            self.assertEqual(states[f"/steps/{step}/boundaries/force"].tolist(), [[0.0, 0.0]] * 2)
+            np.testing.assert_allclose(states[f"/steps/{step}/boundaries/position"], [[0.0, 1e-4 * step], [0.0, 0.0]], rtol=1e-12)
 
     def test_ranks(self):
         tables = [self.history(self.fall(f"on {ranks}", STEPS, ranks)) for ranks in (1, 2)]

@@ -6,7 +6,7 @@ module gravier_boundary_forces
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, name_length
   implicit none
   private
-  public :: boundary_forces_t
+  public :: boundary_forces_t, name_in_columns
 
   !> Of each boundary, the same on every rank.
   type, extends(diagnostic_t) :: boundary_forces_t
@@ -32,23 +32,31 @@ contains
     features%of_scene = .false.
   end function boundary_forces_features
 
+  !> The name of a boundary in the names of its columns: a cell of the head of a table holds neither a comma nor a quote.
+  pure function name_in_columns(name) result(text)
+    character(len=*), intent(in) :: name
+    character(len=len(name)) :: text
+    integer :: k
+
+    text = name
+    do k = 1, len_trim(name)
+      if (scan(name(k:k), ',"') > 0) text(k:k) = "_"
+    end do
+  end function name_in_columns
+
   !> Take the names of the boundaries.
   subroutine boundary_forces_begin(self, decomposition, physics)
     class(boundary_forces_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     real(dp) :: place(3)
-    integer :: b, k
+    integer :: b
 
     associate (boundaries => decomposition%boundaries, unused => physics)
       allocate (self%name(size(boundaries)))
       allocate (self%force(decomposition%nd, size(boundaries)), self%position(decomposition%nd, size(boundaries)), source=0.0_dp)
       do b = 1, size(boundaries)
-        self%name(b) = boundaries(b)%name
-        ! a cell of the head of a table holds neither
-        do k = 1, len_trim(self%name(b))
-          if (scan(self%name(b)(k:k), ',"') > 0) self%name(b)(k:k) = "_"
-        end do
+        self%name(b) = name_in_columns(boundaries(b)%name)
         call boundaries(b)%find_place(place)
         self%position(:, b) = place(1:decomposition%nd)
       end do

@@ -60,6 +60,7 @@ program test_config
   call test_sample()
   call test_keys_of_sample()
   call test_rules_of_sample()
+  call test_empty_names()
   call test_rules_of_box()
   call test_active_options()
   call test_active_groups()
@@ -1094,6 +1095,19 @@ contains
     call refuse(plane // "/ &boundary name = 'a'" // plane_keys // "/", "&boundary (the 2nd, 'a') name = 'a': " // own)
     call refuse(column // "&boundary name = 'boundary 2'" // plane_keys // "/ &boundary" // plane_keys // "/", &
       "&boundary (the 2nd) name: " // own)
+    ! a comma and a quote are `_` in names of columns
+    call refuse(column // "&boundary name = 'a,b'" // plane_keys // "/ &boundary name = 'a_b'" // plane_keys // "/", &
+      "&boundary (the 2nd, 'a_b') name = 'a_b': expected a name of its own in the columns of history.csv, but the 1st is " &
+      // "'a_b' there too")
+    call refuse(plane // "/ &boundary name = 'x,'" // plane_keys // "/ &boundary name = 'x""'" // plane_keys // "/", &
+      "&boundary (the 3rd, 'x""') name = 'x""': expected a name of its own in the columns of history.csv, but the 2nd is " &
+      // "'x_' there too")
+    call accept(column // "&boundary name = 'a,b'" // plane_keys // "/ &boundary name = 'a b'" // plane_keys // "/", &
+      "names that differ in columns", config)
+    call accept(column // "&boundary name = '" // repeat("a", 64) // "'" // plane_keys // "/", "a name of 64 characters", config)
+    call refuse(column // "&boundary name = '" // repeat("a", 65) // "'" // plane_keys // "/", &
+      "&boundary (the 1st, '" // repeat("a", 65) // "') name = '" // repeat("a", 65) &
+      // "': expected at most 64 characters, here 65")
     call refuse(column // "&boundary name = ' '" // plane_keys // "/", &
       "&boundary (the 1st, ' ') name = ' ': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(column // "&boundary shape = 'plane' normal = 3*0 /", first // "normal = 3*0: " // numbers)
@@ -1318,6 +1332,21 @@ contains
       "&sample radii = 'normal': expected 'single', 'uniform', 'uniform_volume', 'log_normal' or 'table'")
   end subroutine test_rules_of_sample
 
+  !> A comma in a list of names has a name on both sides.
+  subroutine test_empty_names()
+    character(len=*), parameter :: lists(5) = [character(len=5) :: ",", "a,,b", "a, ,b", ", a", "a, "]
+    character(len=:), allocatable :: assignment
+    type(config_t) :: config
+    integer :: k
+
+    do k = 1, size(lists)
+      assignment = "grain_shapes = '" // trim(lists(k)) // "'"
+      call refuse(sample("count = 1 box = 1 radius = 1 " // assignment, "shapes = 'b'"), "&sample " // assignment &
+        // ": expected the name of a shape before and behind each comma")
+    end do
+    call accept(sample("count = 1 box = 1 radius = 1 grain_shapes = ' a , b'", "shapes = 'b'"), "blanks beside a comma", config)
+  end subroutine test_empty_names
+
   subroutine test_rules_of_box()
     character(len=*), parameter :: grains = "count = 1 radius = 1 "
     character(len=*), parameter :: needed = "&sample box is missing: expected at most 3 finite real numbers >= 0 (m), " &
@@ -1391,6 +1420,7 @@ contains
     type(config_t) :: config
     character(len=*), parameter :: two = column // "&material name = 'a' / &material name = 'b' / "
     character(len=*), parameter :: coulomb = "&law materials = 'a', 'b' kind = 'coulomb' friction = 0.3 / "
+    character(len=*), parameter :: texts = "expected at most 2 texts in quotes, none of them empty, at most 4096 characters"
     character(len=*), parameter :: wet = "&law materials = 'a' kind = 'adhesive' adhesion = 1 adhesion_range = 0.1 / "
     character(len=:), allocatable :: text
 
@@ -1404,11 +1434,16 @@ contains
     call check_written(text, config)
     call refuse(two // "&law materials = 'a', 'c' kind = 'coulomb' /", "&law (the 1st) materials = 'a', 'c': expected 'a' or 'b'")
     call refuse(two // "&law materials = a kind = 'coulomb' /", &
-      "&law (the 1st) materials = a: expected at most 2 texts in quotes, at most 4096 characters")
+      "&law (the 1st) materials = a: " // texts)
     call refuse(two // "&law materials = 'a', 'b', 'a' kind = 'coulomb' /", &
-      "&law (the 1st) materials = 'a', 'b', 'a': expected at most 2 texts in quotes, at most 4096 characters")
+      "&law (the 1st) materials = 'a', 'b', 'a': " // texts)
+    call refuse(two // "&law materials = 'a', '' kind = 'coulomb' /", "&law (the 1st) materials = 'a', '': " // texts)
+    call refuse(two // "&law materials = ' ', 'a' kind = 'coulomb' /", "&law (the 1st) materials = ' ', 'a': " // texts)
+    call refuse(two // "&law materials = 'a' materials(2) = ' ' kind = 'coulomb' /", "&law (the 1st) materials(2) = ' ': " // texts)
+    call accept(two // "&law materials(2) = 'b' materials(1) = 'a' kind = 'coulomb' /", "names one by one", config)
+    call check_equal(trim(config%laws(1)%materials(2)), "b", "second material by its index")
     call refuse(two // "&law kind = 'coulomb' /", &
-      "&law (the 1st) materials is missing: expected at most 2 texts in quotes, at most 4096 characters")
+      "&law (the 1st) materials is missing: " // texts)
     call refuse(two // "&law materials = 'a' /", &
       "&law (the 1st) kind is missing: expected 'coulomb', 'frictionless', 'none', 'velocity', 'adhesive', 'capillary', "// &
       "'bonded', 'elastic' or 'hertz'")
