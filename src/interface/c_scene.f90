@@ -11,7 +11,7 @@ module gravier_c_scene
   use gravier_c_text, only: told, text_of, put_text
   implicit none
   private
-  public :: gravier_array, gravier_set_array, gravier_set_gravity, gravier_set_friction
+  public :: gravier_array, gravier_check_array, gravier_set_array, gravier_set_gravity, gravier_set_friction
   public :: gravier_boundary, gravier_boundary_name, gravier_get_boundary, gravier_set_boundary
   public :: gravier_add_bodies, gravier_remove_bodies
 
@@ -70,6 +70,26 @@ contains
     end if
     status = told(error)
   end function gravier_array
+
+  !> Whether `gravier_set_array` takes these values.
+  integer(c_int) function gravier_check_array(handle, name, subdomain, values, shape) result(status) &
+    & bind(C, name="gravier_check_array")
+    type(c_ptr), value :: handle
+    !> text of C
+    type(c_ptr), value :: name
+    !> from 0
+    integer(c_int), value :: subdomain
+    !> bodies, entries of each
+    integer(c_int64_t), intent(in) :: shape(2)
+    real(c_double), intent(in) :: values(shape(2), shape(1))
+    type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
+
+    call c_f_pointer(handle, loop)
+    call check_subdomain(loop, subdomain, error)
+    if (.not. allocated(error)) call loop%check_array(text_of(name), subdomain + 1, values, error)
+    status = told(error)
+  end function gravier_check_array
 
   !> Set velocities or applied forces of the bodies of a subdomain of this rank.
   integer(c_int) function gravier_set_array(handle, name, subdomain, values, shape) result(status) bind(C, name="gravier_set_array")

@@ -56,7 +56,8 @@ enum { GRAVIER_DOUBLE = 0, GRAVIER_INT64 = 1, GRAVIER_INT32 = 2 };
 int gravier_array(gravier_simulation *simulation, const char *name, int subdomain, const void **address, int64_t shape[2], int *kind);
 
 /* Set velocity, or force with GRAVIER_FORCES, of all bodies of a subdomain of this rank, in the order and the shape of gravier_array.
- * Each rank sets what it wants to. */
+ * Each rank sets what it wants to. gravier_check_array tells whether gravier_set_array takes the values, and sets nothing. */
+int gravier_check_array(gravier_simulation *simulation, const char *name, int subdomain, const double *values, const int64_t shape[2]);
 int gravier_set_array(gravier_simulation *simulation, const char *name, int subdomain, const double *values, const int64_t shape[2]);
 
 /* What follows is set with the same values on all ranks, holds from the next step on, and is not in checkpoints. */

@@ -38,6 +38,7 @@ module gravier_user_loop
     procedure :: close => user_loop_close
     procedure :: place => user_loop_place
     procedure :: get_array => user_loop_get_array
+    procedure :: check_array => user_loop_check_array
     procedure :: set_array => user_loop_set_array
     procedure :: set_gravity => user_loop_set_gravity
     procedure :: set_friction => user_loop_set_friction
@@ -228,10 +229,10 @@ contains
     end select
   end subroutine user_loop_get_array
 
-  !> Set velocities and spins, or applied forces, of the bodies of subdomain `s` of this rank. Glued bodies keep their velocities.
+  !> Whether velocities and spins, or applied forces, of the bodies of subdomain `s` of this rank can be set to some values.
   !> Failures (status_input): another field, another shape, no forces in this run, a value that is none to reckon with.
-  subroutine user_loop_set_array(self, name, s, values, error)
-    class(user_loop_t), intent(inout) :: self
+  subroutine user_loop_check_array(self, name, s, values, error)
+    class(user_loop_t), intent(in) :: self
     character(len=*), intent(in) :: name
     integer, intent(in) :: s
     !> (entries, bodies)
@@ -262,6 +263,23 @@ contains
           & bounded_text)
         return
       end do
+    end associate
+  end subroutine user_loop_check_array
+
+  !> Set velocities and spins, or applied forces, of the bodies of subdomain `s` of this rank. Glued bodies keep their velocities.
+  !> Failures: as of `check_array`.
+  subroutine user_loop_set_array(self, name, s, values, error)
+    class(user_loop_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: s
+    !> (entries, bodies)
+    real(dp), intent(in), contiguous :: values(:, :)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: k
+
+    call self%check_array(name, s, values, error)
+    if (allocated(error)) return
+    associate (owned => self%run%simulation%decomposition%owned(s))
       if (name == "force") then
         owned%force(:, :) = values
       else

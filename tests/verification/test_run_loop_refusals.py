@@ -110,6 +110,15 @@ with gravier.Simulation(case, quiet=True) as s:
                 pass
             else:
                 raise AssertionError("not refused: " + statement)
+    before = np.array(s.bodies.velocity)
+    wrong = before + 1.0
+    wrong[-1] = np.nan
+    try:
+        s.bodies.velocity = wrong
+    except gravier.SimulationError:
+        assert np.array_equal(before, np.array(s.bodies.velocity)), "a subdomain has taken its part of what was refused"
+    else:
+        raise AssertionError("not refused: NaN in the last row")
     s.remove([48])
     s.remove(np.array([47]))
     try:

@@ -36,7 +36,7 @@ def find_library():
 #: functions and what they take; all but those in RESULTS return a status
 ARGUMENTS = {
     "open": "ssiI*", "step": "h", "stop": "hs", "checkpoint": "h", "close": "h", "finalize": "", "abort": "", "error": "",
-    "whole": "hs*", "real": "hs*", "array": "hsi***", "set_array": "hsi**", "set_gravity": "h*i", "set_friction": "hd",
+    "whole": "hs*", "real": "hs*", "array": "hsi***", "check_array": "hsi**", "set_array": "hsi**", "set_gravity": "h*i", "set_friction": "hd",
     "boundary": "hs*", "boundary_name": "hi", "get_boundary": "his**", "set_boundary": "his*i",
     "add_bodies": "hi*****", "remove_bodies": "hi*", "sum": "hi*", "highest": "hi*",
 }

@@ -132,9 +132,18 @@ class Subdomain:
         # whole rows are copied three times as fast as some of their columns
         return _view(np.array(self._field(name))[:, columns], self._simulation)
 
-    def _set(self, name, values):
+    def _whole(self, name, values):
+        """The field of the library that an array belongs to, and what it will be."""
+        if name == "force":
+            return name, _reals(values, name, (len(self), self._simulation.dimension))
+        whole = np.array(self._field("velocity"))
+        columns = slice(None, self._simulation.dimension) if name == "velocity" else slice(self._simulation.dimension, None)
+        whole[:, columns] = _reals(values, name, whole[:, columns].shape)
+        return "velocity", whole
+
+    def _call(self, function, field, values):
         shape = (ctypes.c_int64 * 2)(*values.shape)
-        call("set_array", self._simulation.handle, name.encode(), self._number, values.ctypes.data, shape)
+        call(function, self._simulation.handle, field.encode(), self._number, values.ctypes.data, shape)
 
     def __len__(self):
         return len(self._field("id"))
@@ -173,7 +182,7 @@ class Subdomain:
 
     @velocity.setter
     def velocity(self, values):
-        self._set_part("velocity", slice(None, self._simulation.dimension), values)
+        self._call("set_array", *self._whole("velocity", values))
 
     @property
     def spin(self):
@@ -181,12 +190,7 @@ class Subdomain:
 
     @spin.setter
     def spin(self, values):
-        self._set_part("spin", slice(self._simulation.dimension, None), values)
-
-    def _set_part(self, what, columns, values):
-        whole = np.array(self._field("velocity"))
-        whole[:, columns] = _reals(values, what, whole[:, columns].shape)
-        self._set("velocity", whole)
+        self._call("set_array", *self._whole("spin", values))
 
     @property
     def force(self):
@@ -194,7 +198,7 @@ class Subdomain:
 
     @force.setter
     def force(self, values):
-        self._set("force", _reals(values, "force", (len(self), self._simulation.dimension)))
+        self._call("set_array", *self._whole("force", values))
 
 
 class Bodies:
@@ -223,8 +227,12 @@ class Bodies:
         values = _reals(values, name)
         if values.ndim != 2 or len(values) != sum(counts):
             raise SimulationError(f"{name}: an array of shape {values.shape}; expected a row for each of the {sum(counts)} bodies of this rank")
-        for one, part in zip(self._subdomains, np.split(values, np.cumsum(counts)[:-1])):
-            setattr(one, name, part)
+        parts = np.split(values, np.cumsum(counts)[:-1])
+        wholes = [(one, *one._whole(name, part)) for one, part in zip(self._subdomains, parts)]
+        # nothing is set where a subdomain refuses its part
+        for function in ("check_array", "set_array"):
+            for one, field, whole in wholes:
+                one._call(function, field, whole)
 
 
 class Boundary:
