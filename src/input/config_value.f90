@@ -217,7 +217,7 @@ contains
     n = len(value)
     is_quoted = .false.
     if (n < 2 .or. n > longest_text) return
-    is_quoted = scan(value(1:1), "'""") == 1 .and. value(n:n) == value(1:1)
+    is_quoted = scan(value(1:1), "'""") == 1 .and. scan(value(n:n), "'""") == 1
   end function is_quoted
 
   subroutine integers_of_record(assignment, value, status)

@@ -10,7 +10,7 @@ class ManyGroups(RunTestCase):
 
     def seconds(self, count):
         """Processor time of a check of so many boundaries."""
-        boundaries = [{"name": f"wall {k}", "shape": "plane", "point": [0.0, -1.0 - k], "normal": [0.0, 1.0], "friction": 0.3, "restitution": 0.1}
+        boundaries = [{"name": f"plane {k}", "shape": "plane", "point": [0.0, -1.0 - k], "normal": [0.0, 1.0], "friction": 0.3, "restitution": 0.1}
                       for k in range(count)]
         case = {"scene": {"bodies": "column"}, "boundary": boundaries, "time": {"step": 1e-3, "steps": 1}}
         write(os.path.join(self.scratch, "case.nml"), namelist(case))

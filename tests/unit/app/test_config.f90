@@ -1442,6 +1442,8 @@ contains
     call refuse(two // "&law materials = 'a' materials(2) = ' ' kind = 'coulomb' /", "&law (the 1st) materials(2) = ' ': " // texts)
     call accept(two // "&law materials(2) = 'b' materials(1) = 'a' kind = 'coulomb' /", "names one by one", config)
     call check_equal(trim(config%laws(1)%materials(2)), "b", "second material by its index")
+    call accept(two // "&law materials = 'a', ""b"" kind = 'coulomb' /", "names in quotes of both kinds", config)
+    call check_equal(trim(config%laws(1)%materials(2)), "b", "second material in other quotes than the first")
     call refuse(two // "&law kind = 'coulomb' /", &
       "&law (the 1st) materials is missing: " // texts)
     call refuse(two // "&law materials = 'a' /", &
