@@ -121,14 +121,17 @@ with gravier.Simulation(case, quiet=True) as s:
         raise AssertionError("not refused: NaN in the last row")
     s.remove([48])
     s.remove(np.array([47]))
-    try:
-        s.checkpoint()
-    except gravier.SimulationError as error:
-        assert str(error) == ("checkpoint: bodies that were added or removed enter or leave at the start of the next step; expected a "
-                              "checkpoint before these calls, or after that step"), str(error)
-    else:
-        raise AssertionError("a checkpoint that loses what was removed")
     s.step()
+    for change in (lambda: s.remove([46]), lambda: s.add_bodies([[0.05, 0.6]], 0.01)):
+        change()
+        try:
+            s.checkpoint()
+        except gravier.SimulationError as error:
+            assert str(error) == ("checkpoint: bodies that were added or removed enter or leave at the start of the next step; expected a "
+                                  "checkpoint before these calls, or after that step"), str(error)
+        else:
+            raise AssertionError("a checkpoint that loses what was added or removed")
+        s.step()
     while s.goes_on:
         s.step()
     for statement, line in {OVER!r}:
