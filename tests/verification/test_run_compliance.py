@@ -123,6 +123,29 @@ class Impacts(ComplianceScene):
                 self.verify(title, "greatest compression over that of the formula", depth[-1] / deepest, 1, 1e-3)
                 self.verify(title, "time of contact over that of the formula", (end - begin) / duration, 1, 1e-3)
 
+    def test_sliding_impact(self):
+        """A fast ball slides all through its impact, with friction against the way it goes: it loses mu (1 + e) v_n of its speed whatever the
+        tangential dashpot is. The springs of Hertz and Mindlin never hold more than the energy of the impact along the normal."""
+        friction, wanted, speed = 0.3, 0.6, 20.0
+        laws = {"elastic": {"normal_stiffness": STIFFNESS},
+                "hertz": {"young_modulus": 1.0e7, "poisson_ratio": 0.3}}
+        for (kind, keys), count in itertools.product(laws.items(), (100, 400)):
+            law = {"materials": ["m"], "kind": kind, "friction": friction, "spring_theta": 0.5, "spring_restitution": wanted,
+                   "tangential_damping": 1.0, **keys}
+            duration = np.pi / FREQUENCY
+            if kind == "hertz":
+                k = 4 / 3 * 1.0e7 / (2 * (1 - 0.3**2)) * np.sqrt(RADIUS)
+                duration = 2.9432751 * (1.25 * MASS / k) ** 0.4
+            self.step = duration / count
+            ball = Grain([0.0, 0.0, RADIUS + 0.3 * self.step], [speed, 0.0, -1.0], radius=RADIUS, mass=MASS)
+            record = self.play(f"sliding {kind} {count}", [ball], [plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], material="m")], steps=2 * count,
+                               material=MATERIAL, law=[law], output={"every": 2 * count, "energy": True})
+            rebound = record.velocity[-1, 0, -1]
+            self.verify(f"sliding impact, {kind}", f"loss of speed over mu (1 + e) v_n, {count} steps",
+                        (speed - record.velocity[-1, 0, 0]) / (friction * (1 + rebound)), 1, 1e-9)
+            if kind == "hertz":
+                self.assertLess(record.run.history()["elastic_energy"].max(), 0.5 * MASS)
+
 
 class Energies(ComplianceScene):
 

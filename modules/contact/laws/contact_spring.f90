@@ -106,20 +106,24 @@ contains
     end associate
   end function spring_step_law
 
-  !> Elongation of a tangential spring that carries the impulse r, whether it sticks or has slid, at the q_m of the next step if the
-  !> velocity stayed what it is at the end of this one [m].
-  pure real(dp) function spring_step_elongation(self, d, h, impulse, velocity) result(elongation)
+  !> Elongation of a tangential spring that carries the impulse r, at the q_m of the next step if the velocity stayed what it is at
+  !> the end of this one [m]. Of a contact that slides a linear spring carries r less what the dashpot would, as in codes of smooth
+  !> DEM. A spring whose stiffness grows with the compression carries all of r: else it would keep an elongation of the dashpot that
+  !> grows with it and pushes the contact on.
+  pure real(dp) function spring_step_elongation(self, d, h, impulse, velocity, slides) result(elongation)
     class(spring_step_t), intent(in) :: self
     !> direction: 2 or 3
     integer, intent(in) :: d
     !> [s], r [N s], v at the end of the step [m/s]
     real(dp), intent(in) :: h, impulse, velocity
-    real(dp) :: rest
+    logical, intent(in) :: slides
+    real(dp) :: rest, damped
 
     associate (phi => self%spring%weight)
       rest = 1.0_dp - phi
-      elongation = -(impulse/h + self%dashpot(2)*(rest*self%velocity(d) + phi*velocity))/self%spring%stiffness(2) &
-        & + h*((1.0_dp - phi**2)*velocity + rest**2*self%velocity(d))
+      damped = self%dashpot(2)*(rest*self%velocity(d) + phi*velocity)
+      if (slides .and. self%spring%hertz > 0.0_dp) damped = 0.0_dp
+      elongation = -(impulse/h + damped)/self%spring%stiffness(2) + h*((1.0_dp - phi**2)*velocity + rest**2*self%velocity(d))
     end associate
   end function spring_step_elongation
 

@@ -4,6 +4,7 @@
 module gravier_contact_springs
   use gravier_kinds, only: dp
   use gravier_contact_spring, only: spring_t
+  use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
   use gravier_contact_operator, only: find_local_operator
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -105,6 +106,7 @@ contains
     type(halo_t), intent(inout) :: halo
     real(dp), allocatable :: v(:, :, :)
     real(dp) :: elongation(2), t(3), s(3)
+    logical :: slides
     integer :: k, c, d, nd
 
     nd = problem%kernels%nd
@@ -117,8 +119,10 @@ contains
         do c = 1, sub%n_contacts
           associate (q => lane_of(c), g => block_of(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
+            slides = norm2(sub%impulse(q, 2:nd, g)) >= (1.0_dp - unused)*sub%hot(q, problem%kernels%row%friction, g)* &
+              & sub%impulse(q, 1, g)
             do d = 2, nd
-              elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g))
+              elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
           end associate
           if (nd == 2) then

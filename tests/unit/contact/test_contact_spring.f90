@@ -63,13 +63,18 @@ contains
       step = step_with(phi)
       law(:) = step%law(2, h, x)
       v = -law(2) - law(1)*r
-      call check_close(step%elongation(2, h, r, v), x + h*v, rounding, "elongation of a spring that sticks")
+      call check_close(step%elongation(2, h, r, v, slides=.false.), x + h*v, rounding, "elongation of a spring that sticks")
       ! v and r need not go together where it slides: the elongation at the weighted instant gives the force
       v = 0.37_dp
-      after = step%elongation(2, h, r, v)
+      after = step%elongation(2, h, r, v, slides=.true.)
       x_f = after - h*v - (1.0_dp - phi)**2*h*step%velocity(2) + phi**2*h*v
       call check_close(-h*(2.0_dp*x_f + step%dashpot(2)*((1.0_dp - phi)*step%velocity(2) + phi*v)), r, rounding, &
         & "force of a spring that slides")
+      ! one that grows with the compression carries all of it, without the dashpot, where it slides and there alone
+      step%spring%hertz = 1.0_dp
+      x_f = step%elongation(2, h, r, v, slides=.true.) - h*v - (1.0_dp - phi)**2*h*step%velocity(2) + phi**2*h*v
+      call check_close(-h*2.0_dp*x_f, r, rounding, "force of a spring of Mindlin that slides")
+      call check_close(step%elongation(2, h, r, v, slides=.false.), after, 0.0_dp, "of one that sticks")
     end do
   end subroutine test_elongation
 

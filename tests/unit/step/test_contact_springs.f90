@@ -113,7 +113,7 @@ contains
       call conclude_springs(problem, h, halo)
       kept(:) = 0.0_dp
       do d = 2, dimension
-        kept(d - 1) = expected%elongation(d, h, 0.7_dp, v(d))
+        kept(d - 1) = expected%elongation(d, h, 0.7_dp, v(d), slides=.true.)
       end do
       call check_close(maxval(abs(list%spring(:, 1) - kept(1:size(list%spring, 1)))), 0.0_dp, rounding, "elongations are kept")
       call check(list%keeps(1), "a pair with an elongation is kept")
