@@ -311,8 +311,9 @@ contains
     real(dp) :: limit, defect
 
     limit = control%accuracy*problem%error_scale
-    is_met = .not. report%residual > 0.0_dp
-    if (is_met) return
+    if (.not. report%residual > 0.0_dp) call state%velocity%look_at_bodies(problem, method, report%iterations)
+    is_met = state%velocity%is_exact
+    if (is_met .or. .not. report%residual > 0.0_dp) return
     if (.not. state%velocity%is_assessed) then
       if (state%velocity%rests()) then
         is_met = state%velocity%all_are_slow(problem)
@@ -327,16 +328,15 @@ contains
     is_met = state%velocity%criterion() <= limit
   end subroutine find_whether_velocity_met
 
-  !> The whole estimate. Where the residual is rounding the velocities are exact. Collective.
+  !> The whole estimate. Collective.
   subroutine complete_estimate(state, problem, method, report)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(solve_report_t), intent(inout) :: report
 
-    report%velocity_error = 0.0_dp
-    if (.not. report%residual > 0.0_dp) return
-    call state%velocity%complete(problem, method, report%iterations)
+    if (.not. report%residual > 0.0_dp) call state%velocity%look_at_bodies(problem, method, report%iterations)
+    if (.not. state%velocity%is_exact) call state%velocity%complete(problem, method, report%iterations)
     report%velocity_error = state%velocity%estimate()
     report%violation = state%velocity%largest_violation
   end subroutine complete_estimate
@@ -350,7 +350,7 @@ contains
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
 
-    report%accurate = .not. report%residual > 0.0_dp
+    report%accurate = state%velocity%is_exact
     if (report%accurate) return
     if (state%velocity%rests()) report%accurate = state%velocity%all_are_slow(problem)
     if (report%accurate) return
@@ -376,7 +376,7 @@ contains
       report%figure = report%error
     case default
       report%figure = report%residual*(control%accuracy/control%tolerance)
-      if (problem%error_scale > 0.0_dp .and. report%residual > 0.0_dp) &
+      if (problem%error_scale > 0.0_dp .and. .not. state%velocity%is_exact) &
         & report%figure = max(report%figure, state%velocity%criterion()/problem%error_scale)
     end select
   end subroutine take_figure

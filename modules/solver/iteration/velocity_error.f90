@@ -40,6 +40,8 @@ module gravier_velocity_error
   real(dp), parameter :: speed_at_rest = 0.2_dp, least_share = 0.2_dp
   !> fraction of the velocity scale that the bodies of a scene nearly at rest have at most, however large the error allowed is
   real(dp), parameter :: slow = 0.3_dp
+  !> rounding of velocities, over the largest free speed and the root of the number of contacts
+  real(dp), parameter :: rounding = 1.0e-13_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> iterations before which Y and L are not trusted
@@ -52,6 +54,8 @@ module gravier_velocity_error
     real(dp), private :: allowed = 0.0_dp, most_at_rest = 0.0_dp
     !> whether Y and the largest violation are known
     logical :: is_assessed = .false.
+    !> the residual is rounding, and so are the errors of all bodies, by the last `look_at_bodies`
+    logical :: is_exact = .false.
     !> C and Y, as far as they are known, by the last `bound` or `assess` [m/s]
     real(dp) :: bound_by_rest = unknown, projection = unknown
     !> L and how fast bodies sink, by the last `add_levels`; 0 since `bound`
@@ -76,6 +80,7 @@ module gravier_velocity_error
     procedure :: assess => velocity_error_assess
     procedure :: rests => velocity_error_rests
     procedure :: complete => velocity_error_complete
+    procedure :: look_at_bodies => velocity_error_look_at_bodies
     procedure :: add_levels => velocity_error_add_levels
     procedure :: estimate => velocity_error_estimate
     procedure :: criterion => velocity_error_criterion
@@ -141,6 +146,7 @@ contains
     type(contact_problem_t), intent(in) :: problem
 
     self%is_assessed = .false.
+    self%is_exact = .false.
     self%bound_by_rest = unknown
     self%projection = unknown
     call self%levels%forget()
@@ -229,6 +235,7 @@ contains
   pure real(dp) function velocity_error_estimate(self) result(estimate)
     class(velocity_error_t), intent(in) :: self
     estimate = self%bound_by_rest
+    if (self%is_exact) estimate = 0.0_dp
     if (.not. (self%is_early .or. self%rests())) estimate = min(estimate, self%wave(weight_of_levels))
   end function velocity_error_estimate
 
@@ -298,6 +305,38 @@ contains
     if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
     if (.not. self%has_levels) call self%add_levels(problem)
   end subroutine velocity_error_complete
+
+  !> Find whether velocities are exact where the residual is rounding, with v_global and the reactions evaluated. Rounding is
+  !> relative to the largest momentum of the scene, and bodies that are lighter by many orders may still be anywhere: no contact may
+  !> violate its law by much, and no body sink by much, unless that is rounding of velocities itself. Collective.
+  subroutine velocity_error_look_at_bodies(self, problem, method, iteration)
+    class(velocity_error_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
+    integer, intent(in) :: iteration
+    real(dp) :: residual, defect, limit
+
+    self%is_exact = problem%n_contacts == 0 .or. .not. self%allowed > 0.0_dp
+    if (self%is_exact) return
+    if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
+    limit = max(self%allowed, rounding*sqrt(real(problem%n_contacts, dp))*problem%velocity_scale)
+    if (error_of_bodies(self) <= limit .and. .not. self%has_levels) then
+      call self%levels%add(problem, self%mass, self%largest_violation)
+      self%has_levels = .true.
+      if (error_of_bodies(self) > limit) then
+        call self%levels%follow(problem, self%largest_violation)
+        self%has_followed = .true.
+      end if
+    end if
+    self%is_exact = error_of_bodies(self) <= limit
+  end subroutine velocity_error_look_at_bodies
+
+  !> What is compared with the error that is allowed of single contacts and bodies [m/s].
+  pure real(dp) function error_of_bodies(self) result(error)
+    class(velocity_error_t), intent(in) :: self
+    error = max(self%largest_violation/violations_allowed, self%levels%fastest_body/body_allowed, &
+      & self%levels%mean_of_bodies/bodies_allowed)
+  end function error_of_bodies
 
   !> The iterations begin anew from other impulses.
   subroutine velocity_error_begin_anew(self, iteration)
