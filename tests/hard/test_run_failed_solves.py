@@ -31,6 +31,26 @@ class FailedSolves(RunTestCase):
             "output": {"directory": "results", "trace": True},
         }
 
+    def test_slow_solves_go_on(self):
+        """A wall pushes a row of 100 disks. As long as the residual falls to its small tolerance, the velocity error is not known, and yet
+        something is gained."""
+        row = "id,x,y,radius,mass\n" + "".join(f"{k + 1},{0.01 + 0.02 * k!r},0,0.01,1\n" for k in range(100))
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": write(self.here("row.csv"), row), "gravity": [0.0, 0.0]},
+            "boundary": [{"name": "wall", "shape": "plane", "normal": [1, 0], "velocity": [0.1, 0.0]}],
+            "time": {"step": 1e-3, "steps": 1},
+            "solver": {"accuracy": 1e-4, "tolerance": 1e-6, "max_iterations": 20000},
+            "output": {"directory": "results", "every": 1},
+        }
+        run = run_case(case, directory=self.here("row"))
+        self.assert_status(run, 0)
+        self.assertLess(np.abs(run.results()["/steps/1/bodies/velocity"][:, 0] - 0.1).max(), 1e-4 * 0.1)
+        # and one that is cut off names a figure
+        run = run_case(merged(case, {"solver": {"max_iterations": 100}}), directory=self.here("cut"))
+        self.assert_status(run, 3)
+        worst = re.search(r"did not reach the accuracy 1.00E-04; at worst (\S+);", run.stdout)
+        self.assertLess(float(worst.group(1)), 10.0)
+
     def assert_clean(self, run):
         """No NaN, no infinity, no unbelievable speed in any file."""
         results = run.results()

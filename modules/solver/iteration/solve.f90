@@ -424,7 +424,7 @@ contains
     if (control%trace .or. (finished .and. .not. (met .and. state%by_estimate))) &
       & call complete_estimate(state, problem, method, report)
     if (met .and. .not. state%by_estimate) call judge_accuracy(state, problem, control, report)
-    if (control%trace) call take_figure(state, problem, control, report)
+    if (control%trace .or. .not. met) call take_figure(state, problem, control, report)
   end subroutine judge
 
   !> Note whether the defect has been above the reference for unmended_iterations and is unmended_limit times it, where the method
@@ -459,7 +459,7 @@ contains
     has_stagnated = .false.
     ! the residual of no impulses is relative to something else
     if (report%iterations == 0) return
-    figures(1) = report%figure
+    figures(1) = merge(report%figure, report%residual*(control%accuracy/control%tolerance), has_estimate(state))
     figures(2) = report%velocity_error
     call state%stagnation%note(problem, report%iterations, figures, method%acceleration%on, &
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
