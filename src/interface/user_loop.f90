@@ -289,6 +289,7 @@ contains
         self%velocities_set = .true.
       end if
       self%bodies_set = .true.
+      ! the step wakes grains on all ranks; a checkpoint that is written before it has those of this rank awake
       call self%run%simulation%wake()
     end associate
   end subroutine user_loop_set_array

@@ -107,9 +107,9 @@ contains
   end function spring_step_law
 
   !> Elongation of a tangential spring that carries the impulse r, at the q_m of the next step if the velocity stayed what it is at
-  !> the end of this one [m]. Of a contact that slides a linear spring carries r less what the dashpot would, as in codes of smooth
-  !> DEM. A spring whose stiffness grows with the compression carries all of r: else it would keep an elongation of the dashpot that
-  !> grows with it and pushes the contact on.
+  !> the end of this one [m]. While a contact slides, a linear spring carries r less the force of the dashpot, as in codes of smooth
+  !> DEM. A spring whose stiffness grows with the compression carries all of r. Its elongation would otherwise hold the force of the
+  !> dashpot over the stiffness of this step; with a larger stiffness in the next steps the spring would push along the sliding.
   pure real(dp) function spring_step_elongation(self, d, h, impulse, velocity, slides) result(elongation)
     class(spring_step_t), intent(in) :: self
     !> direction: 2 or 3

@@ -195,8 +195,7 @@ contains
     criterion = max(self%largest_violation/violations_allowed, &
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
     if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%levels%fastest/sinking_allowed)
-    if (self%has_followed) criterion = max(criterion, self%levels%fastest_body/body_allowed, &
-      & self%levels%mean_of_bodies/bodies_allowed)
+    if (self%has_followed) criterion = max(criterion, error_of_bodies(self))
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
     ! what is reported then is the bound by rest, which has to be within the error allowed, too
@@ -331,7 +330,8 @@ contains
     self%is_exact = error_of_bodies(self) <= limit
   end subroutine velocity_error_look_at_bodies
 
-  !> What is compared with the error that is allowed of single contacts and bodies [m/s].
+  !> What single contacts and bodies contribute to what is compared with the error that is allowed [m/s]; a bound on it as long as
+  !> bodies have not been followed.
   pure real(dp) function error_of_bodies(self) result(error)
     class(velocity_error_t), intent(in) :: self
     error = max(self%largest_violation/violations_allowed, self%levels%fastest_body/body_allowed, &
