@@ -12,6 +12,7 @@ module gravier_time_stepper
   use gravier_pass_backoff, only: pass_backoff_t
   use gravier_solve, only: solve_control_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
+  use gravier_fallback, only: fallback_t
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, remove_grains, drop_grains
   use gravier_inflow, only: inflow_t
@@ -81,6 +82,7 @@ module gravier_time_stepper
     !> grains that enter
     type(inflow_t) :: inflow
     class(method_t), allocatable :: method
+    type(fallback_t) :: fallback
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
     type(pass_backoff_t) :: pass_backoff
@@ -199,6 +201,7 @@ contains
     iterations = 0
     do tries = 1, most_tries + 1
       call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+      call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
       figures%solve%iterations = figures%solve%iterations + iterations
       if (allocated(error) .or. self%resting%bodies == 0 .or. figures%solve%status == solve_diverged) return
       finds_none = figures%solve%status /= solve_converged
@@ -466,6 +469,7 @@ contains
       call self%method%free()
       deallocate (self%method)
     end if
+    call self%fallback%free()
     if (allocated(self%exact)) deallocate (self%exact)
     if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
     if (allocated(self%halo%view)) deallocate (self%halo%view)

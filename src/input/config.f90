@@ -332,6 +332,7 @@ contains
       end if
     end if
     if (.not. config%solver%tolerance_given .and. config%solver%criterion == "velocity_error") config%solver%tolerance = 1.0e-2_dp
+    if (.not. config%solver%fallback_given .and. config%solver%criterion == "velocity_error") config%solver%fallback = "newton"
     if (.not. config%solver%sleep_speed_given) config%solver%sleep_speed = 100.0_dp*min(config%solver%tolerance, 1.0_dp)
     do i = 1, size(config%materials)
       if (.not. config%materials(i)%density_given) config%materials(i)%density = config%scene%density

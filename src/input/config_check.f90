@@ -287,6 +287,7 @@ contains
                   "'residual': the exact solution, and so the error, is known for bodies = 'column' only")
       call expect(report, solver%accuracy > 0.0_dp, "solver", "accuracy", error)
       call expect(report, solver%tolerance > 0.0_dp, "solver", "tolerance", error)
+      call expect(report, solver%fallback_contacts >= 1, "solver", "fallback_contacts", error)
       call expect(report, solver%max_iterations >= 1, "solver", "max_iterations", error)
       call expect(report, solver%sweeps >= 1, "solver", "sweeps", error)
       call expect(report, solver%relaxation > 0.0_dp .and. solver%relaxation <= 1.0_dp, "solver", "relaxation", error)

@@ -228,6 +228,12 @@ module gravier_config_table
      key_t("solver", "tolerance", kind_real, "1e-4", "> 0", &
            "residual, or error on the impulses, at which a solve has converged; with `velocity_error` both must be met", &
            note="1e-2 with `velocity_error`, else 1e-4"), &
+     key_t("solver", "fallback", kind_choice, "'none'", "newton none", &
+           "method that takes over a solve that stagnates, if the problem has at most `fallback_contacts` contacts and neither "// &
+           "rolling nor pivoting friction", &
+           note="newton with `velocity_error`, else none"), &
+     key_t("solver", "fallback_contacts", kind_integer, "10000", ">= 1", &
+           "contacts of a problem that `fallback` takes over, at most"), &
      key_t("solver", "max_iterations", kind_integer, "10000", ">= 1", "iterations after which a solve gives up"), &
      key_t("solver", "sweeps", kind_integer, "1", ">= 1", "Gauss-Seidel sweeps in one iteration"), &
      key_t("solver", "relaxation", kind_real, "1.0", "in (0, 1]", &

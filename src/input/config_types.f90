@@ -113,6 +113,11 @@ module gravier_config_types
     real(dp) :: tolerance
     !> false: 1e-2 where the velocity error ends solves, 1e-4 elsewhere
     logical :: tolerance_given = .false.
+    !> newton or none: what takes over a solve that stagnates, and the contacts of its problem, at most
+    character(len=choice_length) :: fallback
+    integer :: fallback_contacts
+    !> false: newton where the velocity error ends solves and the scene has no moments, none elsewhere
+    logical :: fallback_given = .false.
     integer :: max_iterations, sweeps, check_every
     !> in (0, 1]
     real(dp) :: relaxation

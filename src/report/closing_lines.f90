@@ -9,7 +9,7 @@ module gravier_closing_lines
   use gravier_energy_balance, only: energy_balance_t
   use gravier_simulation, only: simulation_t
   use gravier_memory_report, only: peak_memory
-  use gravier_run_summary, only: converged_text, time_text, halving_text
+  use gravier_run_summary, only: converged_text, mending_text, time_text, halving_text
   use gravier_accuracy_lines, only: goal_name
   use gravier_step_lines, only: balance_text
   implicit none
@@ -47,11 +47,15 @@ contains
     type(communicator_t), intent(in) :: comm
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
-    type(work_t) :: work
+    type(work_t) :: work, more
     integer(i8) :: counts(5)
     real(dp) :: ranks, subdomains
 
     work = simulation%method%work_done()
+    if (allocated(simulation%fallback%method)) then
+      more = simulation%fallback%method%work_done()
+      call work%add(more)
+    end if
     counts(1) = work%relaxations
     counts(2) = work%analyses
     counts(3) = work%factorisations
@@ -63,6 +67,7 @@ contains
       & "interface   "//to_text(work%interface_solves)//" exchanges or interface solves with "// &
       & to_text(work%interface_iterations)//" iterations; subdomain matrices: "//to_text(counts(2))//" analyses, "// &
       & to_text(counts(3))//" factorisations"//newline
+    if (simulation%fallback%taken > 0) text = text//"fallback    "//fallback_text(simulation)//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
       & " contacts of bodies asleep were left out, summed over all steps; "// &
       & counted(simulation%woken, "further solve")//" because bodies woke"//newline
@@ -80,6 +85,18 @@ contains
       & "memory      at most "//to_text(nint(comm%highest(peak_memory())))//" MiB on a rank"//newline// &
       & "messages    "//to_text(counts(4))//" between ranks, "//to_text(8*counts(5)/1024)//" KiB"//newline
   end function work_lines
+
+  !> What the second method did.
+  function fallback_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (fallback => simulation%fallback)
+      text = "method '"//trim(simulation%config%solver%fallback)//"' took over "//counted(fallback%taken, "solve")// &
+        & " that stagnated, "//to_text(fallback%solved)//" of which reached the "//goal_name(simulation)//", in "// &
+        & counted(fallback%iterations, "iteration")
+    end associate
+  end function fallback_text
 
   !> How far energies balance, what the solves took, and what they would have taken with other tolerances. Collective.
   function cost_lines(comm, simulation) result(text)
@@ -162,8 +179,9 @@ contains
       looser_seconds(k) = comm%highest(simulation%effort%seconds_of(iterations(k)))
     end do
     if (simulation%effort%solves == 0) return
-    text = "converged   "//converged_text(simulation)//newline// &
-      & "time        "//time_text(phases, seconds, simulation%effort%solves)//newline// &
+    text = "converged   "//converged_text(simulation)//newline
+    if (simulation%failed > 0) text = text//"to mend it  "//mending_text(simulation)//newline
+    text = text//"time        "//time_text(phases, seconds, simulation%effort%solves)//newline// &
       & "to halve it "//halving_text(simulation, phases, seconds, looser_seconds)//newline
   end function summary_lines
 

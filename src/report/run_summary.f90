@@ -11,7 +11,7 @@ module gravier_run_summary
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: converged_text, time_text, halving_text, verdict_text
+  public :: converged_text, mending_text, time_text, halving_text, verdict_text
 
   !> phases that are named, the dearest first, and the least fraction that is [%]
   integer, parameter :: named = 4
@@ -41,12 +41,58 @@ contains
         if (goal_name(simulation) /= "accuracy") text = text//" and the accuracy "//to_text(simulation%config%solver%accuracy, 3)
       else
         text = "NO: "//to_text(simulation%failed)//" of "//to_text(max(int(simulation%step, i8), tally%solves))// &
-          & " solves did not reach the "//goal_text(simulation)//"; at worst "//to_text(effort%worst, 3)
+          & " solves did not reach the "//goal_text(simulation)
+        if (misses_residual_only(simulation)) then
+          text = text//", because of the tolerance "//to_text(simulation%config%solver%tolerance, 3)// &
+            & " of their residuals alone; at worst "//to_text(tally%worst_residual, 3)
+        else
+          text = text//"; at worst "//to_text(effort%worst, 3)
+        end if
       end if
       text = text//"; "//trim(adjustl(mean))//" iterations a solve"
       if (simulation%failed > 0) text = text//"; "//misses_text(simulation)
     end associate
   end function converged_text
+
+  !> Whether solves ended by the velocity error have missed no more than the residual that goes with it.
+  pure logical function misses_residual_only(simulation) result(only)
+    type(simulation_t), intent(in) :: simulation
+
+    associate (solver => simulation%config%solver, tally => simulation%tally)
+      only = solver%criterion == "velocity_error" .and. tally%missed() > 0 .and. tally%worst_error <= solver%accuracy .and. &
+        & tally%worst_residual > solver%tolerance
+    end associate
+  end function misses_residual_only
+
+  !> What may bring the solves that missed their goal to it, by the way in which most of them ended.
+  function mending_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (tally => simulation%tally, solver => simulation%config%solver, fallback => simulation%fallback)
+      if (tally%missed() == 0) then
+        text = "the solves that missed it were made before the restart"
+      else if (misses_residual_only(simulation) .or. (goal_name(simulation) == "tolerance" .and. &
+        & tally%worst_error <= solver%accuracy .and. tally%unbounded + tally%diverged == 0)) then
+        text = "velocities are within the accuracy "//to_text(solver%accuracy, 3)//": a larger &solver tolerance, now "// &
+          & to_text(solver%tolerance, 3)//", if that is enough"
+      else if (tally%stagnated < max(tally%exhausted, tally%unbounded, tally%diverged)) then
+        text = "a smaller &time step"
+        if (tally%unbounded >= max(tally%exhausted, tally%diverged)) text = text// &
+          & ", or more room: bodies that cannot part are pressed together"
+        if (tally%exhausted > max(tally%unbounded, tally%diverged)) text = "a larger &solver max_iterations, now "// &
+          & to_text(solver%max_iterations)//", or "//text
+      else if (.not. allocated(fallback%method) .and. solver%method /= "newton" .and. .not. simulation%effects%rolling) then
+        text = "&solver fallback = 'newton' takes over solves that stagnate"
+      else if (tally%stagnated > fallback%taken - fallback%solved .and. allocated(fallback%method)) then
+        text = "a larger &solver fallback_contacts, now "//to_text(solver%fallback_contacts)// &
+          & ": Newton's method takes over solves of so many contacts at most"
+      else
+        text = "a smaller &time step, or contacts that yield (&law kind = 'elastic')"
+        if (solver%method /= "newton" .and. .not. simulation%effects%rolling) text = "&solver method = 'newton', "//text
+      end if
+    end associate
+  end function mending_text
 
   !> The goal of a solve with its number.
   function goal_text(simulation) result(text)
@@ -119,8 +165,12 @@ contains
       steps = "them"
       if (simulation%restarted) steps = "the "//to_text(tally%steps)//" steps since the restart"
       if (simulation%failed > 0) then
-        text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "//goal_name(simulation)// &
-          & ": the accuracy of the results is not known"
+        text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "
+        if (misses_residual_only(simulation)) then
+          text = text//"tolerance of the residual: their velocities are within the accuracy, their impulses may not be"
+        else
+          text = text//goal_name(simulation)//": the accuracy of the results is not known"
+        end if
       else if (is_doubtful(simulation)) then
         text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
           & to_text(simulation%config%solver%tolerance, 2)//", but "//doubts_text(simulation)
@@ -221,8 +271,7 @@ contains
       else if (phases(phase_output) > half .and. config%output%every > 0) then
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
-        text = "solves that do not converge take most of the iterations: another &solver method or a smaller "// &
-          & "&time step may let them reach the "//goal_name(simulation)
+        text = "solves that do not converge take most of the iterations: see `to mend it`"
       else if (overlaps_grew(simulation)) then
         text = "nothing yet: overlaps grow; first choose a smaller &time step or &solver "//goal_name(simulation)
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then

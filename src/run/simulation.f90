@@ -23,7 +23,7 @@ module gravier_simulation
   use gravier_scene_cell, only: make_cell_drive
   use gravier_diagnostic_registry, only: diagnostic_holder_t
   use gravier_scene_regions, only: make_region_means
-  use gravier_method_choice, only: choose_scheme
+  use gravier_method_choice, only: choose_scheme, choose_fallback
   use gravier_column_solution, only: column_solution_t
   implicit none
   private
@@ -117,6 +117,7 @@ contains
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%method)
+    call choose_fallback(config, scene%effects, self%fallback)
     self%decomposition%boundaries = scene%boundaries
     self%decomposition%shapes = scene%shapes
     call self%decomposition%figures%init(scene%shapes)

@@ -20,8 +20,7 @@ module gravier_scene
   use gravier_motion, only: grain_mass, grain_inertia
   use gravier_law_set, only: law_set_t
   use gravier_pair_laws, only: set_default_laws
-  use gravier_method_options, only: method_features_t
-  use gravier_method_registry, only: features_of, quoted_names, with_moments
+  use gravier_method_choice, only: check_moments
   use gravier_scene_cell, only: cell_moves, check_cell
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
@@ -231,21 +230,6 @@ contains
     end do
     call comm%agree(error)
   end subroutine glue
-
-  !> Some methods, and files of FCLIB, are for two or three components a contact.
-  subroutine check_moments(config, effects, error)
-    type(config_t), intent(in) :: config
-    type(effects_t), intent(in) :: effects
-    type(error_t), allocatable, intent(inout) :: error
-    type(method_features_t) :: features
-
-    if (.not. effects%rolling) return
-    features = features_of(trim(config%solver%method))
-    if (.not. features%moments) call raise(error, status_input, config%file//": &solver method = '"//trim(config%solver%method)// &
-      & "': expected "//quoted_names(with_moments, "'", "or")//" with rolling or pivoting friction")
-    if (config%output%fclib_step > 0) call raise(error, status_input, config%file//": &output fclib_step = "// &
-      & to_text(config%output%fclib_step)//": expected 0 with rolling or pivoting friction, which a file of FCLIB cannot say")
-  end subroutine check_moments
 
   !> Bodies with shapes turn, and no moments resist that: the arms of their contacts do.
   subroutine check_shapes(config, scene, error)

@@ -24,6 +24,7 @@ module gravier_convergence_history
     integer :: first_check = 1
   contains
     procedure :: note => descent_note
+    procedure :: follow => descent_follow
   end type convergence_history_t
 
   !> Many solves with one tolerance.
@@ -59,6 +60,18 @@ contains
       if (self%first(k) < 0 .and. figure <= tolerance*10.0_dp**(0.5_dp*k)) self%first(k) = iteration
     end do
   end subroutine descent_note
+
+  !> The record of a solve that went on from another one, as of both together.
+  pure subroutine descent_follow(self, before, iterations)
+    class(convergence_history_t), intent(inout) :: self
+    type(convergence_history_t), intent(in) :: before
+    !> of the other one
+    integer, intent(in) :: iterations
+
+    where (self%first >= 0) self%first = self%first + iterations
+    where (before%first >= 0) self%first = before%first
+    self%first_check = before%first_check
+  end subroutine descent_follow
 
   !> Add a solve. One that took iterations to its tolerance would have taken those to its first check at a looser one: what a
   !> looser tolerance leaves adds up from step to step, until it is too much for that one too.

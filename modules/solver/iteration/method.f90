@@ -26,6 +26,8 @@ module gravier_method
     !> times that the automatic relaxation factor of a Schwarz method was lowered, and how far at most
     integer(i8) :: relaxed = 0
     real(dp) :: least_factor = 1.0_dp
+  contains
+    procedure :: add => work_add
   end type work_t
 
   type, abstract :: method_t
@@ -154,6 +156,25 @@ contains
     class(method_t), intent(in) :: self
     work = self%work
   end function method_work_done
+
+  !> Add what another method has done in solves of this one.
+  pure subroutine work_add(self, other)
+    class(work_t), intent(inout) :: self
+    type(work_t), intent(in) :: other
+
+    self%iterations = self%iterations + other%iterations
+    self%sweeps = self%sweeps + other%sweeps
+    self%relaxations = self%relaxations + other%relaxations
+    self%interface_solves = self%interface_solves + other%interface_solves
+    self%interface_iterations = self%interface_iterations + other%interface_iterations
+    self%analyses = self%analyses + other%analyses
+    self%factorisations = self%factorisations + other%factorisations
+    self%lowered = self%lowered + other%lowered
+    self%restarted = self%restarted + other%restarted
+    self%suspended = self%suspended + other%suspended
+    self%relaxed = self%relaxed + other%relaxed
+    self%least_factor = min(self%least_factor, other%least_factor)
+  end subroutine work_add
 
   !> How unevenly the seconds in sweeps lie, of the ranks and of the subdomains: the most over the mean, 1 without any.
   !> Collective.

@@ -1,0 +1,140 @@
+!> A second method, which takes over the solves that stagnate. Sweeps do not carry loads along rows of hundreds of bodies, nor
+!> turn a strip of bonded ones; Newton's method does, at the price of factorisations, in problems that are not too large.
+module gravier_fallback
+  use gravier_kinds, only: dp, i8
+  use gravier_errors, only: error_t
+  use gravier_cell_response, only: respond
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_method, only: method_t
+  use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, &
+    & solve_converged, solve_diverged, solve_stagnated
+  implicit none
+  private
+  public :: fallback_t
+
+  !> iterations of a solve that was taken over, at most: tens of factorisations bring most of them to their goal, and where
+  !> friction leaves velocities undetermined thousands do not
+  integer, parameter :: most_iterations = 2000
+
+  type :: fallback_t
+    !> the second method; not allocated where there is none
+    class(method_t), allocatable :: method
+    !> contacts of a problem that it takes over, at most
+    integer(i8) :: most_contacts = 0
+    !> since this run began or went on from a checkpoint: solves taken over, those of them that reached their goal, and
+    !> iterations that all of them took
+    integer(i8) :: taken = 0, solved = 0, iterations = 0
+  contains
+    procedure :: take_over => fallback_take_over
+    procedure :: free => fallback_free
+  end type fallback_t
+
+  !> Impulses of a subdomain.
+  type :: impulses_t
+    real(dp), allocatable :: r(:, :, :)
+  end type impulses_t
+
+contains
+
+  !> Go on with a solve that has stagnated. The impulses and the report are those of the better end. Collective.
+  subroutine fallback_take_over(self, problem, control, report, error, exact, watch)
+    class(fallback_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    !> of the first solve
+    type(solve_control_t), intent(in) :: control
+    !> of the first solve; then of both as of one
+    type(solve_report_t), intent(inout) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    class(exact_solution_t), intent(in), optional :: exact
+    class(solve_watch_t), intent(inout), optional :: watch
+    type(impulses_t) :: kept(size(problem%sub))
+    type(solve_control_t) :: again
+    type(solve_report_t) :: second
+    integer :: s
+
+    if (allocated(error) .or. .not. allocated(self%method)) return
+    if (report%status /= solve_stagnated .or. problem%n_contacts > self%most_contacts) return
+    again = control
+    again%layered = .false.
+    again%figure_ratio = 0.0_dp
+    again%max_iterations = min(most_iterations, control%max_iterations - report%iterations)
+    if (again%max_iterations < 1) return
+    do s = 1, size(kept)
+      kept(s)%r = problem%sub(s)%impulse
+    end do
+    call solve_contacts(problem, self%method, again, second, error, exact, watch)
+    if (allocated(error)) return
+    self%taken = self%taken + 1
+    self%iterations = self%iterations + second%iterations
+    if (second%status == solve_converged) self%solved = self%solved + 1
+    if (is_better(second, report)) then
+      call join(report, second)
+      return
+    end if
+    do s = 1, size(kept)
+      call move_alloc(kept(s)%r, problem%sub(s)%impulse)
+    end do
+    if (problem%cell%is_driven) call respond(problem)
+    call problem%evaluate()
+    report%iterations = report%iterations + second%iterations
+    report%seconds = report%seconds + second%seconds
+  end subroutine fallback_take_over
+
+  !> Whether the second solve has ended nearer to the goal than the first.
+  pure logical function is_better(second, first)
+    type(solve_report_t), intent(in) :: second, first
+
+    is_better = second%status == solve_converged
+    ! figures of a solve that diverged are no numbers
+    if (is_better .or. second%status == solve_diverged) return
+    is_better = second%figure < first%figure
+  end function is_better
+
+  !> The report of both solves as of one, which ends as the second has ended.
+  pure subroutine join(report, second)
+    !> of the first; then of both
+    type(solve_report_t), intent(inout) :: report
+    type(solve_report_t), intent(in) :: second
+    type(solve_report_t) :: first
+    integer :: n
+
+    first = report
+    report = second
+    report%iterations = first%iterations + second%iterations
+    report%seconds = first%seconds + second%seconds
+    report%start_seconds = first%start_seconds
+    report%layered = first%layered
+    report%layered_sweeps = first%layered_sweeps
+    call report%history%follow(first%history, first%iterations)
+    ! it tells nothing about the first method
+    report%figure_ratio = 0.0_dp
+    if (report%status /= solve_converged) then
+      report%status = first%status
+      report%creep = first%creep
+    end if
+    if (.not. allocated(first%trace)) return
+    n = first%n_trace
+    deallocate (report%trace)
+    allocate (report%trace(size(first%trace, 1), n + second%n_trace))
+    report%trace(:, 1:n) = first%trace(:, 1:n)
+    report%trace(:, n + 1:) = second%trace(:, 1:second%n_trace)
+    ! iterations and seconds go on
+    report%trace(1, n + 1:) = report%trace(1, n + 1:) + first%iterations
+    report%trace(6, n + 1:) = report%trace(6, n + 1:) + first%seconds
+    report%n_trace = n + second%n_trace
+  end subroutine join
+
+  !> Give back what the method holds.
+  subroutine fallback_free(self)
+    class(fallback_t), intent(inout) :: self
+
+    if (allocated(self%method)) then
+      call self%method%free()
+      deallocate (self%method)
+    end if
+    self%taken = 0
+    self%solved = 0
+    self%iterations = 0
+  end subroutine fallback_free
+
+end module gravier_fallback
