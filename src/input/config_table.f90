@@ -229,8 +229,8 @@ module gravier_config_table
            "residual, or error on the impulses, at which a solve has converged; with `velocity_error` both must be met", &
            note="1e-2 with `velocity_error`, else 1e-4"), &
      key_t("solver", "fallback", kind_choice, "'none'", "newton none", &
-           "method that takes over a solve that stagnates, if the problem has at most `fallback_contacts` contacts and neither "// &
-           "rolling nor pivoting friction", &
+           "method that takes over a solve that stagnates or makes 2000 iterations in vain, if the problem has at most "// &
+           "`fallback_contacts` contacts and neither rolling nor pivoting friction", &
            note="newton with `velocity_error`, else none"), &
      key_t("solver", "fallback_contacts", kind_integer, "10000", ">= 1", &
            "contacts of a problem that `fallback` takes over, at most"), &

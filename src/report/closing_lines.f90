@@ -93,7 +93,7 @@ contains
 
     associate (fallback => simulation%fallback)
       text = "method '"//trim(simulation%config%solver%fallback)//"' took over "//counted(fallback%taken, "solve")// &
-        & " that stagnated, "//to_text(fallback%solved)//" of which reached the "//goal_name(simulation)//", in "// &
+        & " that missed the "//goal_name(simulation)//", "//to_text(fallback%solved)//" of which then reached it, in "// &
         & counted(fallback%iterations, "iteration")
     end associate
   end function fallback_text

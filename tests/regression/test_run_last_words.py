@@ -130,7 +130,8 @@ class LastWords(RunTestCase):
                          "finished    all 8 steps reached the accuracy; errors and overlaps are those since the restart; results in results")
 
     def test_ways_to_miss(self):
-        """Solves that end at max_iterations, that stagnate at rounding, that have no solution: each is counted, and the status is 3."""
+        """Solves that end at max_iterations, that stagnate at rounding, that have no solution: each is counted, the status is 3, and the log
+        says what may mend it."""
         write(self.here("grain.csv"), f"id,x,y,radius\n1,0,{RADIUS},{RADIUS}\n")
         crushed = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../grain.csv", "overlap_projection": False},
                    "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
@@ -138,15 +139,20 @@ class LastWords(RunTestCase):
                    "time": {"step": 1e-3, "steps": 2}, "solver": {"acceleration": "none", "max_iterations": 20000},
                    "output": {"directory": "results"}}
         cold = {"solver": {"warm_start": False}, "time": {"steps": 2}}
-        for title, case, how in (
-                ("few", merged(self.rest, cold, {"solver": {"max_iterations": 2}}), "2 ended at max_iterations"),
+        for title, case, how, mend in (
+                ("few", merged(self.rest, cold, {"solver": {"max_iterations": 2}}), "2 ended at max_iterations",
+                 "a larger &solver max_iterations, now 2, or a smaller &time step"),
                 # of more disks some groups go on creeping by more than rounding
-                ("rounding", merged(self.settle("small", [5, 6]), cold, {"solver": {"accuracy": 1e-12, "max_iterations": 200000}}), "2 stagnated"),
-                ("crushed", crushed, "2 found no solution")):
+                ("rounding", merged(self.settle("small", [5, 6]), cold,
+                                    {"solver": {"accuracy": 1e-12, "max_iterations": 200000, "fallback": "none"}}), "2 stagnated",
+                 "&solver fallback = 'newton' takes over solves that stagnate"),
+                ("crushed", crushed, "2 found no solution",
+                 "a smaller &time step, or more room: bodies that cannot part are pressed together")):
             with self.subTest(title):
                 run = run_case(case, 1, self.here(title))
                 self.assert_status(run, 3)
                 self.assertRegex(line(run, "converged"), rf"^converged   NO: 2 of 2 solves did not reach the accuracy .*; {how}$")
+                self.assertEqual(line(run, "to mend it"), "to mend it  " + mend)
                 stagnated, without = run.stdout.count("gain nothing (stagnation)"), run.stdout.count("loads grow without bound")
                 self.assertEqual(f" {stagnated} stagnated" in line(run, "converged"), stagnated > 0)
                 self.assertEqual(f" {without} found no solution" in line(run, "converged"), without > 0)

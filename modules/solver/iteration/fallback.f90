@@ -7,13 +7,14 @@ module gravier_fallback
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, &
-    & solve_converged, solve_diverged, solve_stagnated
+    & solve_converged, solve_exhausted, solve_diverged, solve_stagnated
   implicit none
   private
   public :: fallback_t
 
   !> iterations of a solve that was taken over, at most: tens of factorisations bring most of them to their goal, and where
   !> friction leaves velocities undetermined thousands do not
+  !> Solves that ended at `max_iterations` are taken over after as many, too; fewer are a bound that the user has set.
   integer, parameter :: most_iterations = 2000
 
   type :: fallback_t
@@ -36,7 +37,8 @@ module gravier_fallback
 
 contains
 
-  !> Go on with a solve that has stagnated. The impulses and the report are those of the better end. Collective.
+  !> Go on with a solve that has stagnated, or that made many iterations in vain. The impulses and the report are those of the
+  !> better end. Collective.
   subroutine fallback_take_over(self, problem, control, report, error, exact, watch)
     class(fallback_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -53,12 +55,11 @@ contains
     integer :: s
 
     if (allocated(error) .or. .not. allocated(self%method)) return
-    if (report%status /= solve_stagnated .or. problem%n_contacts > self%most_contacts) return
+    if (.not. has_failed(report) .or. problem%n_contacts > self%most_contacts) return
     again = control
     again%layered = .false.
     again%figure_ratio = 0.0_dp
-    again%max_iterations = min(most_iterations, control%max_iterations - report%iterations)
-    if (again%max_iterations < 1) return
+    again%max_iterations = min(most_iterations, control%max_iterations)
     do s = 1, size(kept)
       kept(s)%r = problem%sub(s)%impulse
     end do
@@ -79,6 +80,12 @@ contains
     report%iterations = report%iterations + second%iterations
     report%seconds = report%seconds + second%seconds
   end subroutine fallback_take_over
+
+  !> Whether more iterations of the first method promise nothing.
+  pure logical function has_failed(report)
+    type(solve_report_t), intent(in) :: report
+    has_failed = report%status == solve_stagnated .or. (report%status == solve_exhausted .and. report%iterations >= most_iterations)
+  end function has_failed
 
   !> Whether the second solve has ended nearer to the goal than the first.
   pure logical function is_better(second, first)

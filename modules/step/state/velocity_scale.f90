@@ -10,7 +10,9 @@
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
-!>     U      = max(U_q, 0.3 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there
+!>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean square of
+!>            the normal impulses that the step starts from, over m
+!>     U      = max(U_q, 0.3 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
@@ -27,6 +29,9 @@ module gravier_velocity_scale
 
   !> share of the motion that goes on which an error may be compared with
   real(dp), parameter :: share_of_own = 0.3_dp
+  !> part of what the impulses of a step would give to the mean grain, below which the motion is that of wedged bodies; impacts leave
+  !> half of it and more
+  real(dp), parameter :: little_motion = 0.2_dp
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp
 
@@ -42,7 +47,7 @@ module gravier_velocity_scale
 
   type :: velocity_scale_t
     !> what can be meant by the velocity of a scene, and which velocity counts [m/s]
-    real(dp) :: load = 0.0_dp, drive = 0.0_dp, creep = 0.0_dp, own = 0.0_dp, value = 0.0_dp
+    real(dp) :: load = 0.0_dp, drive = 0.0_dp, creep = 0.0_dp, own = 0.0_dp, stress = 0.0_dp, value = 0.0_dp
     !> the one that counts
     character(len=20) :: kind = "none"
     !> diameter [m] and mass [kg] of the mean grain; 0 without grains
@@ -158,28 +163,33 @@ contains
     !> that the load on each boundary works on (boundaries) [m^2, m in 2D]
     real(dp), intent(in) :: area(:)
     type(imposed_motion_t) :: motion
-    !> squares and number of attractions, mass, twice the energy, momentum
-    real(dp) :: parts(4 + decomposition%nd, size(problem%sub)), sums(4 + decomposition%nd)
+    !> squares and number of attractions, of impulses where nothing loads or drives, mass, twice the energy, momentum
+    real(dp) :: parts(6 + decomposition%nd, size(problem%sub)), sums(6 + decomposition%nd)
+    logical :: idle
     integer :: s
 
     motion = self%imposed(decomposition%nd, decomposition%boundaries, physics)
     self%drive = motion%difference
     self%load = self%load_of(decomposition%nd, decomposition%boundaries, physics, time, area)
+    idle = .not. (self%load > 0.0_dp .or. self%drive > 0.0_dp)
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
-      call add_grains(problem%sub(s), physics, motion%common, parts(3:, s))
-      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(3:, s))
+      if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
+      call add_grains(problem%sub(s), physics, motion%common, parts(5:, s))
+      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(5:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     if (decomposition%na > 0) self%load = max(self%load, applied_load(problem))
     ! attractions hold bodies together and move none of them but where there is no other load
     if (.not. self%load > 0.0_dp .and. sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = sqrt(sums(1)/sums(2))/self%mass
+    self%stress = 0.0_dp
+    if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%own = 0.0_dp
-    if (sums(3) > 0.0_dp) then
+    if (sums(5) > 0.0_dp) then
       ! nothing holds a scene without boundaries: its mean motion is none
-      if (.not. motion%bounded) sums(4) = max(sums(4) - sum(sums(5:)**2)/sums(3), 0.0_dp)
-      self%own = sqrt(sums(4)/sums(3))
+      if (.not. motion%bounded) sums(6) = max(sums(6) - sum(sums(7:)**2)/sums(5), 0.0_dp)
+      self%own = sqrt(sums(6)/sums(5))
     end if
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
@@ -194,6 +204,15 @@ contains
     sums(1) = sum(sub%attraction**2)
     sums(2) = real(count(sub%attraction > 0.0_dp), dp)
   end subroutine add_attraction
+
+  !> Squares of the normal impulses that the step starts from, and their number.
+  pure subroutine add_impulses(sub, sums)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: sums(2)
+
+    sums(1) = sum(sub%impulse(:, 1, :)**2)
+    sums(2) = real(count(sub%impulse(:, 1, :) > 0.0_dp), dp)
+  end subroutine add_impulses
 
   !> Mass, twice the energy and momentum of the grains at the start of the step. Loads of the step are taken out of the
   !> velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains share counts
@@ -364,6 +383,10 @@ contains
     self%value = self%load
     self%kind = "load of a step"
     if (.not. self%load > 0.0_dp) self%kind = "none"
+    if (.not. (self%load > 0.0_dp .or. self%drive > 0.0_dp) .and. self%own < little_motion*self%stress) then
+      self%value = self%stress
+      self%kind = "contact forces"
+    end if
     slow = max(self%drive, self%creep)
     if (self%drive > 0.0_dp .and. (slow < self%load .or. .not. self%load > 0.0_dp)) then
       self%value = slow

@@ -10,6 +10,7 @@ program test_velocity_scale
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_test_scenes, only: plane, change_shape
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_config, only: config_t, parse_config
@@ -58,6 +59,7 @@ program test_velocity_scale
     call test_loads(nd)
     call test_drives(nd)
     call test_own(nd)
+    call test_stress(nd)
     call test_applied(nd)
     call test_given(nd)
     call test_ranks(nd)
@@ -315,6 +317,56 @@ contains
     own = sqrt(own_square - sum(mean**2))
     call check_close(sim%velocity_scale%own, own, 1.0e-11_dp*own, "a gas that flies")
   end subroutine test_own
+
+  !> Grains that nothing loads or drives and that do not move, but that press on each other: their forces are what is compared with.
+  !> Those that move, and impulses that only part of the contacts have, make a difference.
+  subroutine test_stress(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim
+    real(dp) :: stress
+
+    stress = 3.0_dp/grain_mass(nd, radius, density)
+    scene%nd = nd
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.0_dp, "none", "nothing presses")
+    call press(sim, 3.0_dp)
+    call check_scale(sim, stress, "contact forces", "wedged grains")
+    scene%motion = 0.1_dp*stress
+    call assemble(comm, scene, sim)
+    call press(sim, 3.0_dp)
+    call check_scale(sim, stress, "contact forces", "wedged grains that hardly move")
+    scene%motion = 0.5_dp*stress
+    call assemble(comm, scene, sim)
+    call press(sim, 3.0_dp)
+    call check(sim%velocity_scale%own > 0.2_dp*stress, "grains that move")
+    call check_scale(sim, 0.3_dp*sim%velocity_scale%own, "motion of the bodies", "grains that move and press")
+    scene = scene_t(nd=nd, gravity=g)
+    call assemble(comm, scene, sim)
+    call press(sim, 3.0e3_dp)
+    call check_scale(sim, g*step, "load of a step", "grains that are loaded and press")
+    scene = scene_t(nd=nd, sliding=1.0e-3_dp)
+    call assemble(comm, scene, sim)
+    call press(sim, 3.0e3_dp)
+    call check(sim%velocity_scale%kind /= "contact forces", "grains that are driven and press")
+  end subroutine test_stress
+
+  !> Give every second contact a normal impulse, and measure the scale anew.
+  subroutine press(sim, impulse)
+    type(simulation_t), intent(inout) :: sim
+    !> [N s]
+    real(dp), intent(in) :: impulse
+    real(dp) :: area(size(sim%decomposition%boundaries))
+    integer :: s, c
+
+    do s = 1, size(sim%problem%sub)
+      do c = 1, sim%problem%sub(s)%n_contacts, 2
+        sim%problem%sub(s)%impulse(lane_of(c), 1, block_of(c)) = impulse
+      end do
+    end do
+    area(:) = 1.0_dp
+    call sim%velocity_scale%measure(sim%decomposition, sim%physics, sim%problem, step, area)
+  end subroutine press
 
   !> The force that a loop applies to grain `k`.
   pure real(dp) function push_on(k, d, most) result(push)
