@@ -36,6 +36,8 @@ module gravier_law_set
     logical :: varies = .false.
     !> some law has restitution, or a default law had
     logical :: returns = .false.
+    !> the largest coefficient of normal restitution of these
+    real(dp) :: most_restitution = 0.0_dp
     !> some law attracts, has a memory, has springs, is one of spheres alone
     logical :: attracts = .false., remembers = .false., yields = .false., of_spheres = .false.
     !> the largest of all laws; range in [m]
@@ -88,6 +90,7 @@ contains
     values(4) = coefficients%rolling_friction
     values(5) = coefficients%pivoting_friction
     self%returns = self%returns .or. any(values(2:3) > 0.0_dp)
+    self%most_restitution = max(self%most_restitution, coefficients%restitution)
     call make_law("coulomb", coulomb_names, values, self%of(-b))
   end subroutine law_set_set_default
 
@@ -154,6 +157,7 @@ contains
       self%varies = self%varies .or. .not. law%is_constant
       self%returns = self%returns .or. max(law%largest%restitution, law%largest%tangential_restitution) > 0.0_dp
       call self%largest%raise_to(law%largest)
+      self%most_restitution = max(self%most_restitution, law%largest%restitution)
       self%range = max(self%range, law%range)
     end associate
   end subroutine law_set_add

@@ -12,7 +12,8 @@
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean square of
 !>            the normal impulses that the step starts from, over m
-!>     U      = max(U_q, 0.3 own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress
+!>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress
+!>            f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
@@ -29,6 +30,8 @@ module gravier_velocity_scale
 
   !> share of the motion that goes on which an error may be compared with
   real(dp), parameter :: share_of_own = 0.3_dp
+  !> f, at least, where contacts send velocities back: errors of solves add energy, which impacts that lose none never take away again
+  real(dp), parameter :: least_lost = 0.05_dp
   !> part of what the impulses of a step would give to the mean grain, below which the motion is that of wedged bodies; impacts leave
   !> half of it and more
   real(dp), parameter :: little_motion = 0.2_dp
@@ -54,6 +57,8 @@ module gravier_velocity_scale
     real(dp) :: diameter = 0.0_dp, mass = 0.0_dp
     !> simulated time [s]; 0: none
     real(dp) :: duration = 0.0_dp
+    !> largest coefficient of restitution of the laws
+    real(dp) :: restitution = 0.0_dp
     !> value that the user gives in the place of all rules; 0: none [m/s]
     real(dp) :: given = 0.0_dp
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
@@ -170,6 +175,7 @@ contains
 
     motion = self%imposed(decomposition%nd, decomposition%boundaries, physics)
     self%drive = motion%difference
+    self%restitution = physics%laws%most_restitution
     self%load = self%load_of(decomposition%nd, decomposition%boundaries, physics, time, area)
     idle = .not. (self%load > 0.0_dp .or. self%drive > 0.0_dp)
     parts(:, :) = 0.0_dp
@@ -373,7 +379,7 @@ contains
   !> The rule.
   pure subroutine velocity_scale_choose(self)
     class(velocity_scale_t), intent(inout) :: self
-    real(dp) :: slow
+    real(dp) :: slow, motion
 
     if (self%given > 0.0_dp) then
       self%value = self%given
@@ -393,8 +399,9 @@ contains
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"
     end if
-    if (share_of_own*self%own > self%value) then
-      self%value = share_of_own*self%own
+    motion = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)*self%own
+    if (motion > self%value) then
+      self%value = motion
       self%kind = "motion of the bodies"
     end if
   end subroutine velocity_scale_choose
