@@ -426,7 +426,6 @@ contains
     call start_timer(phase_setup)
     call find_load_areas(self%decomposition, area)
     call self%velocity_scale%measure(self%decomposition, self%physics, self%problem, self%time + self%physics%h, area)
-    self%problem%error_scale = self%velocity_scale%value
     call stop_timer(phase_setup)
   end subroutine measure_velocity_scale
 

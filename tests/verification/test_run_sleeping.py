@@ -51,6 +51,27 @@ class Sleeping(RunTestCase):
         cls.plain, cls.sleeping = each(lambda name, more: run_case(merged(cls.case, more), 1, f"{cls.scratch}/{name}"),
                                        [("plain", {}), ("sleeping", SLEEPING)])
 
+    def test_slow_plate(self):
+        """A plate begins to rise slowly under a column that sleeps: all disks rise with it, and none stands still."""
+        speed, begin, end = 1e-4, 0.3, 1.5
+        table = write(f"{self.scratch}/plate.csv", f"time,vy\n0,0\n{begin - 1e-3},0\n{begin},{speed}\n100,{speed}\n")
+        column = [Grain([0.0, (2 * k + 1) * RADIUS], radius=RADIUS, mass=1.0) for k in range(20)]
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": write(f"{self.scratch}/column.csv", bodies_csv(column)), "friction": 0.3},
+            "boundary": [{**plane([0, 0], [0, 1]), "table": table}],
+            "time": {"step": 1e-3, "steps": round(end / 1e-3)},
+            "solver": {"sleeping": True},
+            "output": {"directory": "results", "every": round(end / 1e-3)},
+        }
+        run = run_case(case, 1, f"{self.scratch}/plate")
+        self.assert_status(run, 0)
+        asleep = run.history()["sleeping"]
+        self.assertGreater(asleep[:round(begin / 1e-3) - 1].max(), 0)
+        self.assertEqual(asleep[round(begin / 1e-3) + 1:].max(), 0)
+        results = run.results()
+        rise = results[f"/steps/{round(end / 1e-3)}/bodies/position"][:, 1] - results["/steps/0/bodies/position"][:, 1]
+        self.assertLess(np.abs(rise / (speed * (end - begin)) - 1.0).max(), 0.05)
+
     def test_falling_disk(self):
         """The heap that is hit wakes, the other one sleeps on, and both come to the places that they have without sleep."""
         self.assert_status(self.sleeping, 0)

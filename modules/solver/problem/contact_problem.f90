@@ -131,6 +131,9 @@ module gravier_contact_problem
     real(dp) :: rounded_scale = 0.0_dp
     !> velocity against which errors of a solve are compared, see gravier_velocity_scale; set by whoever builds the problem [m/s]
     real(dp) :: error_scale = 0.0_dp
+    !> velocity that boundaries or the cell impose, and at least that of a drift that nobody would see; huge where they impose none
+    !> [m/s]
+    real(dp) :: drive_scale = huge(1.0_dp)
   contains
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual

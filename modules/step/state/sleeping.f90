@@ -27,11 +27,13 @@ module gravier_sleeping
   use gravier_borne_impulses, only: contacts_t, find_seen, leave_out
   implicit none
   private
-  public :: sleeping_rule_t, count_rest, may_push, momentum_of
+  public :: sleeping_rule_t, count_rest, may_push, momentum_of, carried_momentum
 
   !> momentum of a body at rest with what may change while it sleeps, and changes of the impulses on it in a step, over the normal
   !> impulses on it
   real(dp), parameter :: share = 0.1_dp, settled = 0.05_dp
+  !> the same momentum over that of the velocity which boundaries impose: a body that a slow boundary carries is not at rest
+  real(dp), parameter :: share_of_drive = 0.2_dp
 
   !> What the contacts of the bodies of a subdomain say.
   type :: rest_t
@@ -102,13 +104,23 @@ contains
     call leave_out(problem, leaving, halo, decomposition)
   end subroutine count_rest
 
-  !> l/2 [N s]: the momentum that a body at rest may have.
-  pure real(dp) function allowed(rule, impulse_scale, pressing)
+  !> l [N s]: twice the momentum that a body at rest may have, and that which wakes it.
+  pure real(dp) function waking_momentum(rule, problem, pressing, mass)
     type(sleeping_rule_t), intent(in) :: rule
-    !> root mean square of all impulses; normal impulses on the body [N s]
-    real(dp), intent(in) :: impulse_scale, pressing
-    allowed = 0.5_dp*min(rule%speed*impulse_scale, share*pressing)
-  end function allowed
+    type(contact_problem_t), intent(in) :: problem
+    !> normal impulses on the body [N s], its mass [kg]
+    real(dp), intent(in) :: pressing, mass
+    waking_momentum = min(rule%speed*problem%impulse_scale, share*pressing, carried_momentum(problem, mass))
+  end function waking_momentum
+
+  !> Momentum that a body has where boundaries or the cell carry it, as far as that matters; huge where they do not move [N s].
+  pure real(dp) function carried_momentum(problem, mass)
+    type(contact_problem_t), intent(in) :: problem
+    !> [kg]
+    real(dp), intent(in) :: mass
+    carried_momentum = huge(1.0_dp)
+    if (problem%drive_scale < huge(1.0_dp)) carried_momentum = share_of_drive*mass*problem%drive_scale
+  end function carried_momentum
 
   !> Sums over the contacts of each body of a subdomain: normal impulses, and by how much they have changed since the step before.
   subroutine sum_impulses(boundaries, list, sub, nv, sums)
@@ -155,7 +167,8 @@ contains
       do b = 1, sub%n_columns
         if (b <= sub%n_grains) then
           rest%rests(b) = rest%sums(2, b) <= settled*rest%sums(1, b) .and. &
-            & is_slow(sub, problem%kernels%nd, allowed(rule, problem%impulse_scale, rest%sums(1, b)), b)
+            & is_slow(sub, problem%kernels%nd, &
+            & 0.5_dp*waking_momentum(rule, problem, rest%sums(1, b), 1.0_dp/sub%inverse_mass(1, b)), b)
         else if (sub%boundary(b) > 0) then
           rest%rests(b) = .not. may_push(boundaries(sub%boundary(b)))
         end if
@@ -241,7 +254,7 @@ contains
         associate (sub => problem%sub(s))
           call find_senders(problem, s, sends)
           do b = 1, sub%n_grains
-            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking_momentum(s, b))
+            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking(s, b))
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle
@@ -249,7 +262,7 @@ contains
             records(1, n) = sub%owner(b)
             records(2, n) = sub%id(b)
             records(3, n) = rest(s)%steps(b)
-            records(4, n) = transfer(waking_momentum(s, b), 0_i8)
+            records(4, n) = transfer(waking(s, b), 0_i8)
           end do
         end associate
       end do
@@ -264,10 +277,10 @@ contains
   contains
 
     !> The momentum that wakes grain `b` of subdomain `s` of this rank, l [N s].
-    pure real(dp) function waking_momentum(s, b)
+    pure real(dp) function waking(s, b)
       integer, intent(in) :: s, b
-      waking_momentum = 2.0_dp*allowed(rule, problem%impulse_scale, rest(s)%sums(1, b))
-    end function waking_momentum
+      waking = waking_momentum(rule, problem, rest(s)%sums(1, b), 1.0_dp/problem%sub(s)%inverse_mass(1, b))
+    end function waking
 
     !> Set what is known of grain `place` of subdomain `h` of this rank.
     subroutine put(h, place, steps, momentum)

@@ -157,12 +157,12 @@ contains
   end function arm
 
   !> Find the velocity of a step from its contact problem, whose boundaries hold the velocities of the end of the step as far as
-  !> no contact acts on them. One reduction. Collective.
+  !> no contact acts on them, and tell the problem. One reduction. Collective.
   subroutine velocity_scale_measure(self, decomposition, physics, problem, time, area)
     class(velocity_scale_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    type(contact_problem_t), intent(in) :: problem
+    type(contact_problem_t), intent(inout) :: problem
     !> end of the step [s]
     real(dp), intent(in) :: time
     !> that the load on each boundary works on (boundaries) [m^2, m in 2D]
@@ -200,6 +200,9 @@ contains
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call self%choose()
+    problem%error_scale = self%value
+    problem%drive_scale = huge(1.0_dp)
+    if (self%drive > 0.0_dp) problem%drive_scale = max(self%drive, self%creep)
   end subroutine velocity_scale_measure
 
   !> Squares of the impulses of attraction and their number.
