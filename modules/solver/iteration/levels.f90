@@ -132,7 +132,7 @@ contains
     real(dp), allocatable :: parts(:, :), sums(:)
     !> power and force of the levels from 0, for what lies in none, in rows that take turns: additions do not wait for each other
     real(dp), allocatable :: crossing(:, :, :)
-    real(dp) :: sinking, squares
+    real(dp) :: sinking, squares, heavy
     integer :: s, b, l, n, i, j, q, g, turn
 
     if (self%most_depth < 0) call self%find_depth(problem)
@@ -158,7 +158,10 @@ contains
         parts(n + 1:2*n, s) = sum(crossing(2, :, 1:), dim=1)
         do b = 1, sub%n_grains
           l = part%depth(b)
-          if (l > 0) parts(2*n + l, s) = parts(2*n + l, s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+          if (l == 0) cycle
+          heavy = 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+          if (allocated(sub%concern)) heavy = sub%concern(b)*heavy
+          parts(2*n + l, s) = parts(2*n + l, s) + heavy
         end do
       end associate
     end do

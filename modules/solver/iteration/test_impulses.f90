@@ -167,9 +167,11 @@ contains
       ! the products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j
       associate (sub => problem%sub(s), part => self%part(s), products => parts(at_products + 1:, s))
         if (allocated(part%load)) then
-          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, part%load, part%recent, products)
+          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, part%load, part%recent, &
+            & products, sub%concern)
         else
-          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, sub%reaction, part%recent, products)
+          call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, sub%reaction, part%recent, &
+            & products, sub%concern)
         end if
       end associate
     end do

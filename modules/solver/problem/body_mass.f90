@@ -231,7 +231,7 @@ contains
 
   !> The products x M^-1 x, x M^-1 y, y M^-1 y, x M^-1 z, y M^-1 z and z M^-1 z of impulses on bodies, a copy of a shared body
   !> counting with its part [J].
-  subroutine inverse_products(inverse_mass, copies, x, y, z, products)
+  subroutine inverse_products(inverse_mass, copies, x, y, z, products, factors)
     !> (nw, bodies and more)
     real(dp), intent(in), contiguous :: inverse_mass(:, :)
     !> of each body (bodies)
@@ -239,6 +239,8 @@ contains
     !> (nv, bodies and more) [N s, N m s]
     real(dp), intent(in), contiguous :: x(:, :), y(:, :), z(:, :)
     real(dp), intent(out) :: products(:)
+    !> of the masses; not present: 1 (bodies)
+    real(dp), intent(in), contiguous, optional :: factors(:)
     real(dp) :: share, sums(6)
     integer :: b, d, nw
 
@@ -246,6 +248,7 @@ contains
     sums(:) = 0.0_dp
     do b = 1, size(copies)
       share = 1.0_dp/copies(b)
+      if (present(factors)) share = share/factors(b)
       if (nw == full) then
         call add_full(share, inverse_mass(:, b), x(:, b), y(:, b), z(:, b))
         cycle

@@ -42,6 +42,8 @@ module gravier_contact_problem
     integer, allocatable :: place(:)
     !> subdomains in which each body carries contacts (n_bodies)
     integer, allocatable :: multiplicity(:)
+    !> factor of the mass of each body in the velocity error, where slow bodies are beside fast ones; not allocated: 1 (n_bodies)
+    real(dp), allocatable :: concern(:)
     !> number of the boundary behind a column, 0 for a grain that sleeps (n_grains + 1 to n_columns)
     integer, allocatable :: boundary(:)
     !> of grains (n_grains) [m]

@@ -38,6 +38,11 @@ module gravier_velocity_scale
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp
 
+  !> part of U below which the own scale of a body makes it a slow one, and the least own scale, over U
+  real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
+  !> the kind of U where it is the motion that goes on
+  character(len=*), parameter :: of_motion = "motion of the bodies"
+
   !> What boundaries impose on the grains at a time.
   type :: imposed_motion_t
     !> largest difference of velocities [m/s]
@@ -59,6 +64,8 @@ module gravier_velocity_scale
     real(dp) :: duration = 0.0_dp
     !> largest coefficient of restitution of the laws
     real(dp) :: restitution = 0.0_dp
+    !> U_q [m/s], and the part of the motion that errors are compared with
+    real(dp) :: quiet = 0.0_dp, share = 0.0_dp
     !> value that the user gives in the place of all rules; 0: none [m/s]
     real(dp) :: given = 0.0_dp
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
@@ -200,6 +207,8 @@ contains
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call self%choose()
+    if (.not. motion%bounded .and. sums(5) > 0.0_dp) motion%common(1:decomposition%nd) = sums(7:)/sums(5)
+    call set_concerns(self, physics, motion%common, problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
     if (self%drive > 0.0_dp) problem%drive_scale = max(self%drive, self%creep)
@@ -233,28 +242,68 @@ contains
     real(dp), intent(in) :: frame(3)
     !> (2 + nd)
     real(dp), intent(inout) :: sums(:)
-    real(dp) :: v(size(sums) - 2), carried(size(sums) - 2), m, volume
+    real(dp) :: v(3), m
     integer :: b, nd
 
-    nd = size(v)
+    nd = size(sums) - 2
     do b = 1, sub%n_grains
-      m = 1.0_dp/sub%inverse_mass(1, b)
-      volume = 0.0_dp
-      if (allocated(sub%volume)) volume = sub%volume(b)
-      v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*volume/m)
-      if (allocated(sub%applied)) v(:) = v - sub%applied(:, b)
-      if (physics%cell%moves) then
-        carried(:) = gradient_times(physics%cell%before, sub%cell%place(:, b))
-        v(:) = v - carried
-      end if
-      if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
-      v(:) = v - frame(1:nd)
-      m = m/sub%multiplicity(b)
+      call find_own_velocity(sub, physics, b, v(1:nd))
+      v(1:nd) = v(1:nd) - frame(1:nd)
+      m = 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
       sums(1) = sums(1) + m
-      sums(2) = sums(2) + m*sum(v**2)
-      sums(3:) = sums(3:) + m*v
+      sums(2) = sums(2) + m*sum(v(1:nd)**2)
+      sums(3:) = sums(3:) + m*v(1:nd)
     end do
   end subroutine add_grains
+
+  !> The velocity of a grain at the start of the step, beside that of a cell that deforms.
+  pure subroutine find_own_velocity(sub, physics, b, v)
+    type(subproblem_t), intent(in) :: sub
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: b
+    !> (nd) [m/s]
+    real(dp), intent(out) :: v(:)
+    real(dp) :: carried(size(v)), m, volume
+    integer :: nd
+
+    nd = size(v)
+    m = 1.0_dp/sub%inverse_mass(1, b)
+    volume = 0.0_dp
+    if (allocated(sub%volume)) volume = sub%volume(b)
+    v(:) = sub%v_free(1:nd, b) - physics%h*(physics%gravity(1:nd) + physics%body_force(1:nd)*volume/m)
+    if (allocated(sub%applied)) v(:) = v - sub%applied(:, b)
+    if (physics%cell%moves) then
+      carried(:) = gradient_times(physics%cell%before, sub%cell%place(:, b))
+      v(:) = v - carried
+    end if
+    if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
+  end subroutine find_own_velocity
+
+  !> Where the motion of the bodies is what errors are compared with, slow ones among them are to be as exact as if they were alone:
+  !> their errors count as much more as their own velocity is smaller, and light ones as if they had the mass of the mean grain.
+  subroutine set_concerns(self, physics, frame, problem)
+    class(velocity_scale_t), intent(in) :: self
+    type(physics_t), intent(in) :: physics
+    !> velocity of the observer [m/s]
+    real(dp), intent(in) :: frame(3)
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: v(problem%kernels%nd), own
+    integer :: s, b
+
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s))
+        if (allocated(sub%concern)) deallocate (sub%concern)
+        if (self%kind /= of_motion) cycle
+        allocate (sub%concern(sub%n_bodies), source=1.0_dp)
+        do b = 1, sub%n_grains
+          call find_own_velocity(sub, physics, b, v)
+          own = max(self%quiet, self%share*norm2(v - frame(1:size(v))), least_own*self%value)
+          if (own >= slow_part*self%value) cycle
+          sub%concern(b) = (slow_part*self%value/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
+        end do
+      end associate
+    end do
+  end subroutine set_concerns
 
   !> What applied forces add to the velocities of grains in contact in a step, as a root mean square by mass [m/s]. Collective.
   real(dp) function applied_load(problem) result(load)
@@ -382,7 +431,7 @@ contains
   !> The rule.
   pure subroutine velocity_scale_choose(self)
     class(velocity_scale_t), intent(inout) :: self
-    real(dp) :: slow, motion
+    real(dp) :: slow
 
     if (self%given > 0.0_dp) then
       self%value = self%given
@@ -402,10 +451,11 @@ contains
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"
     end if
-    motion = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)*self%own
-    if (motion > self%value) then
-      self%value = motion
-      self%kind = "motion of the bodies"
+    self%quiet = self%value
+    self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
+    if (self%share*self%own > self%value) then
+      self%value = self%share*self%own
+      self%kind = of_motion
     end if
   end subroutine velocity_scale_choose
 
