@@ -56,6 +56,7 @@ contains
     self%attracts = .true.
     self%sees_velocity = .false.
     self%remembers = .true.
+    self%breaks = .true.
     self%largest%friction = max(self%friction, self%bond_friction)
     call self%set_resistance(values(5), values(6))
   end subroutine bonded_set

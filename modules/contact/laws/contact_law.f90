@@ -55,6 +55,8 @@ module gravier_contact_law
   type, abstract :: contact_law_t
     !> some pair may have an attraction; pairs have states
     logical :: attracts = .false., remembers = .false.
+    !> pairs that open or slide in a step never attract again
+    logical :: breaks = .false.
     !> pairs have springs, whose elongations stay with them
     logical :: yields = .false.
     !> its terms depend on the relative velocity at the start of the step, which is not made for the pairs of other laws

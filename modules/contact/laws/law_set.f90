@@ -40,6 +40,8 @@ module gravier_law_set
     real(dp) :: most_restitution = 0.0_dp
     !> some law attracts, has a memory, has springs, is one of spheres alone
     logical :: attracts = .false., remembers = .false., yields = .false., of_spheres = .false.
+    !> some law has pairs that break for good where they open or slide in a step
+    logical :: breaks = .false.
     !> the largest of all laws; range in [m]
     type(coefficients_t) :: largest
     real(dp) :: range = 0.0_dp
@@ -151,6 +153,7 @@ contains
     associate (law => self%of(self%n)%law)
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
+      self%breaks = self%breaks .or. law%breaks
       if (law%passes) call self%filter%add(a, b, size(self%of_pair, 1))
       self%yields = self%yields .or. law%yields
       self%of_spheres = self%of_spheres .or. law%of_spheres

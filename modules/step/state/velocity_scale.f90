@@ -12,8 +12,10 @@
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean square of
 !>            the normal impulses that the step starts from, over m
-!>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress
+!>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
+!>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress;
 !>            f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
+!> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other.
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
@@ -38,10 +40,12 @@ module gravier_velocity_scale
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp
 
+  !> of what bonds could give to the mean grain in a step: motion as a whole says nothing of the forces that bonds have to bear
+  real(dp), parameter :: share_of_bonds = 0.2_dp
   !> part of U below which the own scale of a body makes it a slow one, and the least own scale, over U
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
-  !> the kind of U where it is the motion that goes on
-  character(len=*), parameter :: of_motion = "motion of the bodies"
+  !> the kinds of U where it is the motion that goes on, and where bonds limit that
+  character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
 
   !> What boundaries impose on the grains at a time.
   type :: imposed_motion_t
@@ -64,6 +68,8 @@ module gravier_velocity_scale
     real(dp) :: duration = 0.0_dp
     !> largest coefficient of restitution of the laws
     real(dp) :: restitution = 0.0_dp
+    !> what the mean attraction of a bond that may break for good gives to the mean grain in a step; 0 without bonds [m/s]
+    real(dp) :: bonds = 0.0_dp
     !> U_q [m/s], and the part of the motion that errors are compared with
     real(dp) :: quiet = 0.0_dp, share = 0.0_dp
     !> value that the user gives in the place of all rules; 0: none [m/s]
@@ -177,6 +183,7 @@ contains
     type(imposed_motion_t) :: motion
     !> squares and number of attractions, of impulses where nothing loads or drives, mass, twice the energy, momentum
     real(dp) :: parts(6 + decomposition%nd, size(problem%sub)), sums(6 + decomposition%nd)
+    real(dp) :: attraction
     logical :: idle
     integer :: s
 
@@ -194,8 +201,11 @@ contains
     end do
     call problem%comm%sum_parts(parts, sums)
     if (decomposition%na > 0) self%load = max(self%load, applied_load(problem))
+    attraction = 0.0_dp
+    if (sums(2) > 0.0_dp .and. self%mass > 0.0_dp) attraction = sqrt(sums(1)/sums(2))/self%mass
+    self%bonds = merge(attraction, 0.0_dp, physics%laws%breaks)
     ! attractions hold bodies together and move none of them but where there is no other load
-    if (.not. self%load > 0.0_dp .and. sums(2) > 0.0_dp .and. self%mass > 0.0_dp) self%load = sqrt(sums(1)/sums(2))/self%mass
+    if (.not. self%load > 0.0_dp) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
     self%stress = 0.0_dp
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%own = 0.0_dp
@@ -287,19 +297,20 @@ contains
     !> velocity of the observer [m/s]
     real(dp), intent(in) :: frame(3)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: v(problem%kernels%nd), own
+    real(dp) :: v(problem%kernels%nd), own, limit
     integer :: s, b
 
+    limit = slow_part*self%value
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         if (allocated(sub%concern)) deallocate (sub%concern)
-        if (self%kind /= of_motion) cycle
+        if (self%kind /= of_motion .and. self%kind /= of_bonds) cycle
         allocate (sub%concern(sub%n_bodies), source=1.0_dp)
         do b = 1, sub%n_grains
           call find_own_velocity(sub, physics, b, v)
           own = max(self%quiet, self%share*norm2(v - frame(1:size(v))), least_own*self%value)
-          if (own >= slow_part*self%value) cycle
-          sub%concern(b) = (slow_part*self%value/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
+          if (own >= limit) cycle
+          sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
         end do
       end associate
     end do
@@ -456,6 +467,9 @@ contains
     if (self%share*self%own > self%value) then
       self%value = self%share*self%own
       self%kind = of_motion
+      if (.not. (self%bonds > 0.0_dp .and. self%value > max(self%quiet, share_of_bonds*self%bonds))) return
+      self%value = max(self%quiet, share_of_bonds*self%bonds)
+      self%kind = of_bonds
     end if
   end subroutine velocity_scale_choose
 
