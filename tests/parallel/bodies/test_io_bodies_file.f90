@@ -636,6 +636,10 @@ contains
 
     call refuse_hdf5(3_i8, 0.0_dp, 1.0_dp, "id 3 appears twice")
     call refuse_hdf5(0_i8, 0.0_dp, 1.0_dp, "/bodies/id: row 3 (counted from 0): 0, but an id >= 1 was expected")
+    call refuse_hdf5(10_i8**18, 0.0_dp, 1.0_dp, &
+      & "/bodies/id: row 3 (counted from 0): 1000000000000000000, but an id of at most 18 digits was expected")
+    call refuse_hdf5(huge(1_i8), 0.0_dp, 1.0_dp, &
+      & "/bodies/id: row 3 (counted from 0): 9223372036854775807 or more, but an id of at most 18 digits was expected")
     call refuse_hdf5(4_i8, ieee_value(1.0_dp, ieee_quiet_nan), 1.0_dp, "/bodies/position: id 4: NaN or infinity")
     call refuse_hdf5(4_i8, 0.0_dp, ieee_value(1.0_dp, ieee_positive_inf), "/bodies/radius: id 4: NaN or infinity")
     call refuse_hdf5(4_i8, 0.0_dp, 0.0_dp, "/bodies/radius: id 4: 0.00000000E+00, but a number > 0 was expected")
