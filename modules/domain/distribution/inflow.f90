@@ -51,6 +51,8 @@ module gravier_inflow
   type :: owed_t
     type(new_grain_t), allocatable :: grain(:)
     integer(i8), allocatable :: taken(:)
+    !> it owes more than may enter in a step
+    logical :: more = .false.
   end type owed_t
 
 contains
@@ -152,7 +154,7 @@ contains
     allocate (owed(size(self%insertions)))
     n = 0
     do i = 1, size(owed)
-      call self%insertions(i)%list_owed(time, step, owed(i)%grain)
+      call self%insertions(i)%list_owed(time, step, owed(i)%grain, owed(i)%more)
       n = n + size(owed(i)%grain)
     end do
     if (n == 0) return
@@ -267,6 +269,7 @@ contains
     logical :: found
     integer :: k, c
 
+    found = .true.
     do k = 1, size(owed%grain)
       associate (grain => owed%grain(k))
         found = .false.
@@ -288,6 +291,7 @@ contains
         insertion%mass = insertion%mass + grain%mass
       end associate
     end do
+    if (found .and. owed%more) insertion%held_back = insertion%held_back + 1
     insertion%drawn = insertion%drawn + int(size(owed%grain), i8)*candidates_a_grain
   end subroutine choose_places
 
