@@ -296,7 +296,7 @@ contains
     call read_id(table, layout%id, bodies%id(i), error)
     call read_quantities(table, layout%position, .true., bodies%position(:, i), error)
     call read_quantities(table, layout%velocity, .false., bodies%velocity(:, i), error)
-    call expect_nothing(table, layout%normal, "a body: a plane has a normal", error)
+    call expect_nothing(table, layout%normal, "a body (normals are of planes)", error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
     call read_number(table, layout%group, "a group", 0, bodies%group(i), error)
     call read_number(table, layout%material, "a material", 1, bodies%material(i), error)
@@ -375,7 +375,7 @@ contains
 
     call read_id(table, layout%id, bodies%wall_id(i), error)
     call read_quantities(table, layout%position, .true., bodies%wall_point(:, i), error)
-    call expect_nothing(table, layout%velocity, "a plane, which stands still", error)
+    call expect_nothing(table, layout%velocity, "a plane, which stands still,", error)
     others(1) = layout%radius
     others(2) = layout%mass
     others(3) = layout%scale

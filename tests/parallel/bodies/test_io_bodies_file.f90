@@ -628,8 +628,8 @@ contains
 
     call refuse_cells("1,grain,,,,,1,,", "")
     call refuse_cells("1,grain,0,1,,,1,,", &
-      & 'line 5: column ny: "1", but an empty cell or 0 in the row of a body: a plane has a normal')
-    call refuse_cells(",plane,0,1,-1,,,,", 'line 5: column vx: "-1", but an empty cell or 0'//of_plane//", which stands still")
+      & 'line 5: column ny: "1", but an empty cell or 0 in the row of a body (normals are of planes) was')
+    call refuse_cells(",plane,0,1,-1,,,,", 'line 5: column vx: "-1", but an empty cell or 0'//of_plane//", which stands still, was")
     call refuse_cells(",plane,0,1,,2,,,", 'line 5: column omega: "2", but an empty cell or 0'//of_plane)
     call refuse_cells(",plane,0,1,,,5,,", 'line 5: column mass: "5", but an empty cell or 0'//of_plane)
     call refuse_cells(",plane,0,1,,,,4,", 'line 5: column group: "4", but an empty cell or 0'//of_plane)
