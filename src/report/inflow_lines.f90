@@ -2,7 +2,7 @@
 module gravier_inflow_lines
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
-  use gravier_insertion, only: insertion_t
+  use gravier_insertion, only: insertion_t, most_a_step
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -14,7 +14,8 @@ module gravier_inflow_lines
 
 contains
 
-  !> Warnings, each a line ended by a newline, and their number: rates at which grains enter faster than they leave the region.
+  !> Warnings, each a line ended by a newline, and their number: rates at which grains enter faster than they leave the region, or
+  !> of more grains than may enter in a step.
   subroutine inflow_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text
@@ -29,6 +30,12 @@ contains
         rate = insertion%rate
         if (insertion%mass_rate < huge(1.0_dp)) rate = insertion%mass_rate/insertion%mean_mass()
         if (.not. rate < huge(1.0_dp)) cycle
+        if (exceeds_steps(insertion, rate, simulation%physics%h, simulation%config%time%steps)) then
+          number = number + 1
+          text = text//"warning     &insertion '"//insertion%name//"': "//to_text(rate, 3)//" grains a second are "// &
+            & to_text(rate*simulation%physics%h, 3)//" in a step, in which at most "//to_text(most_a_step)// &
+            & " of an insertion enter: several insertions or smaller steps let more of them enter"//newline
+        end if
         stay = min(time_in_region(insertion, simulation%physics%gravity), simulation%config%time%steps*simulation%physics%h)
         if (.not. stay > 0.0_dp) cycle
         most = easily_filled(insertion%nd)*insertion%volume()/(insertion%radii%mean_volume()*stay)
@@ -40,6 +47,16 @@ contains
       end associate
     end do
   end subroutine inflow_warnings
+
+  !> Whether more grains are owed in a step than may enter in one.
+  pure logical function exceeds_steps(insertion, rate, step, steps) result(exceeds)
+    type(insertion_t), intent(in) :: insertion
+    !> of grains [1/s], length of a step [s]
+    real(dp), intent(in) :: rate, step
+    integer, intent(in) :: steps
+
+    exceeds = rate*step > most_a_step .and. insertion%planned(steps*step) > most_a_step
+  end function exceeds_steps
 
   !> Time in which a grain crosses a region along its velocity, or along gravity; huge where neither moves it [s].
   pure real(dp) function time_in_region(insertion, gravity) result(time)
@@ -119,15 +136,31 @@ contains
     grains = insertion%grains_behind(time)
     mass = insertion%mass_behind(time)
     if (grains > 0) then
-      text = text//", *** "//to_text(grains)//" fewer than its rate owes: they found no place"
+      text = text//", *** "//to_text(grains)//" fewer than its rate owes: "//why_behind(insertion, "they")
     else if (mass > 0.0_dp) then
-      text = text//", *** "//to_text(mass, 3)//" kg less than its rate owes: grains found no place"
+      text = text//", *** "//to_text(mass, 3)//" kg less than its rate owes: "//why_behind(insertion, "grains")
     else if (insertion%is_complete()) then
       text = text//", all that its bounds allow"
     else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
       text = text//", all that its rate owes"
     end if
     if (insertion%put_off > 0) text = text//"; grains were put off in "//counted(insertion%put_off, "step")
+    if (insertion%held_back > 0) text = text//"; more than "//to_text(most_a_step)//" were to enter in "// &
+      & counted(insertion%held_back, "step")
   end function insertion_line
+
+  !> What keeps an insertion from its rate: full regions, the most that may enter in a step, or both.
+  pure function why_behind(insertion, they) result(text)
+    type(insertion_t), intent(in) :: insertion
+    !> the grains
+    character(len=*), intent(in) :: they
+    character(len=:), allocatable :: text
+
+    text = they//" found no place"
+    if (insertion%held_back == 0) return
+    if (insertion%put_off == 0) text = ""
+    if (text /= "") text = text//", and "
+    text = text//"at most "//to_text(most_a_step)//" enter in a step"
+  end function why_behind
 
 end module gravier_inflow_lines

@@ -10,6 +10,7 @@ module gravier_checkpoint
   use gravier_body_store, only: body_record
   use gravier_boundary, only: boundary_words, boundary_record
   use gravier_insertion, only: insertion_words, insertion_record
+  use gravier_inflow, only: given_words, given_record
   use gravier_population, only: population_words, population_record
   use gravier_pass_backoff, only: pass_backoff_words, pass_backoff_record
   use gravier_impulse_memory, only: pair_record
@@ -38,6 +39,7 @@ contains
       & "boundary: "//boundary_record//", "//to_text(boundary_words)//" words"//newline// &
       & "cell: "//period_record//", "//to_text(period_words)//" words"//newline// &
       & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
+      & "given grains: "//given_record//", "//to_text(given_words)//" words"//newline// &
       & "population: "//population_record//", "//to_text(population_words)//" words"//newline// &
       & "passes: "//pass_backoff_record//", "//to_text(pass_backoff_words)//" words"//newline// &
       & "solves: figure_ratio"//newline
@@ -184,7 +186,7 @@ contains
     call file%close(error)
   end subroutine load_checkpoint
 
-  !> The accounts of the insertions. Failure (status_input): accounts that no run has.
+  !> The accounts of the grains that a loop has placed and of the insertions. Failure (status_input): accounts that no run has.
   subroutine load_insertions(simulation, file, path, error)
     type(simulation_t), intent(inout) :: simulation
     type(checkpoint_file_t), intent(in) :: file
@@ -194,7 +196,7 @@ contains
     logical :: sound
     integer :: n
 
-    n = insertion_words*size(simulation%inflow%insertions)
+    n = given_words + insertion_words*size(simulation%inflow%insertions)
     call file%read_array("insertions", n, n, words, error)
     if (allocated(error)) return
     call simulation%inflow%set_state(words, sound)

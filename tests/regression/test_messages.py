@@ -148,6 +148,9 @@ class Messages(RunTestCase):
                              ("id,x,y,radius\n1,here,0,1\n", '"here", but a', "number was expected")):
             write(self.here("bodies.csv"), text)
             self.refuse("&scene bodies = 'file', bodies_file = 'bodies.csv' /\n&time step = 1e-3, steps = 1 /\n", "bodies.csv: line 2", *words)
+        write(self.here("bodies.csv"), "id,x,y,radius,material\n1,0,0,1,2\n")
+        self.refuse("&scene bodies = 'file', bodies_file = 'bodies.csv' /\n&time step = 1e-3, steps = 1 /\n",
+                    "bodies.csv: id 1: material 2: expected 1, since bad.nml has no &material")
         for position, word in (([[0.0, 0.0]], "1 rows, but /bodies/id has 2"), ([[0.0, 0.0], [np.nan, 0.0]], "id 2: NaN or infinity"),
                                ([[b"a", b"b"]] * 2, "not made of numbers")):
             with h5py.File(self.here("bodies.h5"), "w") as file:
@@ -203,6 +206,7 @@ class Messages(RunTestCase):
                 (STUDY + "&variant name = '' /\n", ("expected a name",)),
                 (STUDY + "&variant sweeps = 2 /\n", ("&variant (number 1) name is missing",)),
                 (STUDY.replace("case = 'case.nml', ", ""), ("&study case",)),
+                (STUDY.replace("'tolerance'", "'steps'"), ("expected a key of a case, but of &boundary, &sample, &insertion or &output, and not 'steps'",)),
                 (STUDY.replace("'tolerance', values = 1e-3, 1e-4", "'step', values = 7e-4"), ("expected steps that divide the duration",))):
             write(self.here("study.nml"), text)
             self.has(self.run_program("study.nml", program="gravier_accuracy"), words)

@@ -208,6 +208,26 @@ class Insertion(RunTestCase):
             self.assertIn("all that its bounds allow", each.stdout)
             self.assertNotIn("fewer than its rate owes", each.stdout)
 
+    def test_most_in_a_step(self):
+        """More than 1000 grains a step do not enter. The log says so, and of the steps in which grains found no place."""
+        def still(steps, upper):
+            keys = {"lower": [0.0, 0.5], "upper": [10.0, upper], "rate": 1.4e6, "count": 4000, "velocity": [0.0, 0.0], "velocity_spread": None}
+            return merged(changed(**keys), {"scene": {"gravity": [0.0, 0.0]}, "boundary": BIN[:1], "time": {"steps": steps},
+                                            "output": {"every": 0, "energy": False, "checkpoint_every": 0}})
+
+        for steps, line in ((2, "*** 800 fewer than its rate owes: at most 1000 enter in a step; more than 1000 were to enter in 2 steps"),
+                            (4, "all that its bounds allow; more than 1000 were to enter in 3 steps")):
+            with self.subTest(steps=steps):
+                run = run_case(still(steps, 10.5), directory=self.here(f"most{steps}"))
+                self.assert_status(run, 0)
+                self.assertIn("&insertion 'feed': 1.40E+06 grains a second are 1.40E+03 in a step, in which at most 1000 of an insertion enter: ",
+                              run.stdout)
+                self.assertIn(line + "\n", run.stdout)
+        run = run_case(still(8, 0.54), directory=self.here("most_both"))
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"\*\*\* \d+ fewer than its rate owes: they found no place, and at most 1000 enter in a step; "
+                                     r"grains were put off in \d steps; more than 1000 were to enter in \d steps?\n")
+
     def test_no_rest_before_grains_enter(self):
         """Neither an empty scene before its start nor one that waits for the next grain is at rest; a scene that is complete is."""
         rules = {"time": {"steps": 4000, "rest_energy": 1e-5}}

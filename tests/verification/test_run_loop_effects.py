@@ -6,8 +6,8 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import LONG, differences, merged, run_case, steps_of, write
-from loop_runs import HEAP, LoopTestCase
+from gravier_runs import LONG, differences, gravier, merged, namelist, run_case, steps_of, write
+from loop_runs import HEAP, LoopTestCase, written
 
 SET = """
 with gravier.Simulation(case, quiet=True) as s:
@@ -271,6 +271,39 @@ with gravier.Simulation(case, quiet=True) as s:
         history = runs[0].history()
         self.assertEqual((history["grains"][9], history["grains"][10]), (48, 49))
         self.assertLess(np.abs(history["energy_error"]).max(), 1e-11 * np.abs(history["load_work"]).max())
+
+    def test_newcomers_in_a_checkpoint(self):
+        """A restart knows the grains that a loop has added, and their mass to the bit, with an insertion and without one."""
+        script = """
+with gravier.Simulation(case, restart="--restart" in sys.argv) as s:
+    while s.goes_on:
+        if s.made == 10:
+            s.add_bodies([[0.03, 0.3], [0.08, 0.3]], 0.01, mass=[0.1, 0.7])
+        if s.made == 20:
+            s.remove([17])
+        s.step()
+"""
+        outlet = {"name": "out", "shape": "outlet", "point": [0.0, 0.004], "normal": [0.0, 1.0]}
+        closed = merged(HEAP, {"boundary": [outlet]})
+        opened = merged(closed, {"insertion": [{"name": "rain", "lower": [0.0, 0.4], "upper": [0.2, 0.5], "rate": 300.0, "radius": 0.009}]})
+        for title, groups in (("closed", closed), ("opened", opened)):
+            whole = self.play(title, groups, script)
+            half = merged(groups, {"time": {"steps": 30}})
+            parts = [self.play(f"{title}{k}", half, script) for k in range(2)]
+            by_loop = self.play(f"{title}0", groups, script, "--restart", ranks=2)
+            write(parts[1].path("case.nml"), namelist(groups))
+            by_program = gravier("--restart", "case.nml", directory=parts[1].directory)
+            self.assert_status(by_program, 0)
+            for again in (by_loop, by_program):
+                self.assertEqual(differences(self.states(whole), self.states(again)), [])
+                lines = [[line for line in run.stdout.splitlines() if line.startswith("grains      ")] for run in (whole, again)]
+                self.assertRegex(lines[0][-1], r" 48 at the start \+ (2|2\d) entered - ")
+                self.assertEqual(lines[0], lines[1])
+
+    def states(self, run):
+        """What a run has written, but for the state in which it was interrupted and the input of its beginning."""
+        return {name: value for name, value in written(run.directory).items()
+                if not any(part in name for part in ("steps/30", "last_written", "input_text"))}
 
     def test_stop_criterion(self):
         script = """

@@ -267,6 +267,9 @@ with gravier.Simulation(case) as s:
         self.assertEqual(len(loop.history()["step"]), 5)
         two = self.play("raised2", HEAP, script, ranks=2, status=4)
         self.assertIn("ValueError: enough", two.stderr)
+        stale = script.replace('raise ValueError("enough")', "place + 1.0").replace("    for k", "    place = s.bodies.position\n    for k")
+        two = self.play("raised3", HEAP, stale, ranks=2, status=4)
+        self.assertIn("StaleArray: this array of bodies is of a step that is over", two.stderr)
 
     def test_the_library_is_missed_in_one_line(self):
         script = "import gravier\ntry:\n    gravier.Simulation('case.nml')\nexcept gravier.SimulationError as error:\n    print(error)\n"

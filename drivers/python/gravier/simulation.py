@@ -317,7 +317,7 @@ class Simulation:
     def __exit__(self, kind, error, trace):
         if self._handle is None:
             return
-        if error is not None and not isinstance(error, (SimulationError, StaleArray)) and self.ranks > 1:
+        if error is not None and not isinstance(error, SimulationError) and self.ranks > 1:
             # the other ranks wait for this one
             traceback.print_exception(kind, error, trace)
             sys.stderr.flush()

@@ -14,10 +14,12 @@ module gravier_bodies_checks
 
   !> kinds of numbers: any of which only ratios count; of a place or velocity; of a size above 0
   integer, parameter :: direction = 0, quantity = 1, extent = 2
+  !> that a body or wall of a file may have, of 18 digits as in tables: boundaries and grains that enter get larger ones
+  integer(i8), parameter :: largest_id = 10_i8**18 - 1
 
 contains
 
-  !> Refuse ids below 1 on any rank. Collective.
+  !> Refuse ids below 1 and those of more digits than a table may have, on any rank. Collective.
   subroutine check_ids(comm, place, first, id, error)
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: place
@@ -30,18 +32,26 @@ contains
     call comm%agree(error)
   end subroutine check_ids
 
-  !> Refuse ids below 1.
+  !> Refuse ids below 1 and those of more digits than a table may have. HDF5 makes an unsigned number that is too large for a word
+  !> the largest word.
   subroutine check_own_ids(place, first, id, error)
     character(len=*), intent(in) :: place
     integer(i8), intent(in) :: first
     integer(i8), intent(in), contiguous :: id(:)
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: place_of_row
     integer :: i
 
     do i = 1, size(id)
-      if (id(i) >= 1) cycle
-      call raise(error, status_input, place//": row "//to_text(first + i - 1)//" (counted from 0): "//to_text(id(i))// &
-        & ", but an id >= 1 was expected")
+      if (id(i) >= 1 .and. id(i) <= largest_id) cycle
+      place_of_row = place//": row "//to_text(first + i - 1)//" (counted from 0): "//to_text(id(i))
+      if (id(i) < 1) then
+        call raise(error, status_input, place_of_row//", but an id >= 1 was expected")
+      else if (id(i) < huge(id)) then
+        call raise(error, status_input, place_of_row//", but an id of at most 18 digits was expected")
+      else
+        call raise(error, status_input, place_of_row//" or more, but an id of at most 18 digits was expected")
+      end if
       return
     end do
   end subroutine check_own_ids

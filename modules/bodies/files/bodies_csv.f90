@@ -4,13 +4,14 @@ module gravier_bodies_csv
   use gravier_narrow, only: narrow, take_count
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text, lower
-  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
+  use gravier_magnitude, only: is_size, size_text
   use gravier_communicator, only: communicator_t
   use gravier_csv_table, only: csv_table_t
   use gravier_shape_library, only: shape_library_t
   use gravier_shape_names, only: find_shape, shape_names
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls, find_own_rows, make_unit
-  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
+  use gravier_bodies_cells, only: read_id, read_number, read_positive, read_numbers, read_quantities, expect_nothing
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes, is_fine_turn, fine_turn_text
   implicit none
   private
   public :: read_bodies_csv
@@ -291,12 +292,11 @@ contains
     integer, intent(in) :: i
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: ignored(3)
 
     call read_id(table, layout%id, bodies%id(i), error)
     call read_quantities(table, layout%position, .true., bodies%position(:, i), error)
     call read_quantities(table, layout%velocity, .false., bodies%velocity(:, i), error)
-    call read_numbers(table, layout%normal, .false., ignored, error)
+    call expect_nothing(table, layout%normal, "a body (normals are of planes)", error)
     if (.not. table%is_empty(layout%mass)) call read_positive(table, layout%mass, "a mass > 0", bodies%mass(i), error)
     call read_number(table, layout%group, "a group", 0, bodies%group(i), error)
     call read_number(table, layout%material, "a material", 1, bodies%material(i), error)
@@ -358,6 +358,7 @@ contains
     call read_quantities(table, layout%turn, .false., given, error)
     if (allocated(error)) return
     turn(:) = given
+    if (.not. is_fine_turn(turn)) call table%refuse(layout%turn(1), fine_turn_text, error)
     call settle_turn(turn, possible)
     if (.not. possible) call table%refuse(layout%turn(maxloc(layout%turn, dim=1)), "a quaternion that is not zero", error)
   end subroutine read_turn
@@ -368,19 +369,24 @@ contains
     integer, intent(in) :: i
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: ignored(6)
-    integer :: number
+    real(dp) :: turn(4)
+    integer :: number, others(4)
     logical :: possible
 
     call read_id(table, layout%id, bodies%wall_id(i), error)
     call read_quantities(table, layout%position, .true., bodies%wall_point(:, i), error)
-    call read_numbers(table, layout%velocity, .false., ignored, error)
-    if (.not. table%is_empty(layout%radius)) call table%get_real(layout%radius, ignored(1), error)
-    if (.not. table%is_empty(layout%mass)) call table%get_real(layout%mass, ignored(1), error)
-    if (.not. table%is_empty(layout%scale)) call table%get_real(layout%scale, ignored(1), error)
-    call read_numbers(table, layout%turn, .false., ignored, error)
-    call read_number(table, layout%group, "a group", 0, number, error)
+    call expect_nothing(table, layout%velocity, "a plane, which stands still,", error)
+    others(1) = layout%radius
+    others(2) = layout%mass
+    others(3) = layout%scale
+    others(4) = layout%group
+    call expect_nothing(table, others, "a plane", error)
+    ! a real part alone is no turn
+    call read_numbers(table, layout%turn, .false., turn, error)
+    call expect_nothing(table, layout%turn(merge(2, 1, size(layout%turn) == 4):), "a plane", error)
     call read_number(table, layout%material, "a material", 1, number, error)
+    if (number > 1) call table%refuse(layout%material, "an empty cell or 1 in the row of a plane, whose material is "// &
+      & "wall_material of &scene,", error)
     if (any(layout%normal == 0)) then
       call table%refuse(layout%shape, "a grain (a plane needs the columns "//normal_names(bodies%dimension)//")", error)
       return
@@ -390,83 +396,6 @@ contains
     call make_unit(bodies%wall_normal(:, i), possible)
     if (.not. possible) call table%refuse(layout%normal(1), "a normal that is not zero", error)
   end subroutine read_plane
-
-  subroutine read_id(table, column, id, error)
-    type(csv_table_t), intent(in) :: table
-    integer, intent(in) :: column
-    integer(i8), intent(inout) :: id
-    type(error_t), allocatable, intent(inout) :: error
-
-    call table%get_integer(column, id, error)
-    if (allocated(error)) return
-    if (id < 1) call table%refuse(column, "an id >= 1", error)
-  end subroutine read_id
-
-  !> Read the number of the group that a grain is glued to, or of its material; a cell that is empty or missing is the least.
-  subroutine read_number(table, column, what, least, number, error)
-    type(csv_table_t), intent(in) :: table
-    integer, intent(in) :: column
-    !> for messages
-    character(len=*), intent(in) :: what
-    integer, intent(in) :: least
-    integer, intent(out) :: number
-    type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: value
-
-    number = least
-    if (table%is_empty(column)) return
-    call table%get_integer(column, value, error)
-    if (allocated(error)) return
-    if (value < least .or. value > huge(number)) then
-      call table%refuse(column, what//" from "//to_text(least)//" to "//to_text(huge(number)), error)
-    else
-      number = narrow(value)
-    end if
-  end subroutine read_number
-
-  subroutine read_positive(table, column, expected, value, error)
-    type(csv_table_t), intent(in) :: table
-    integer, intent(in) :: column
-    character(len=*), intent(in) :: expected
-    real(dp), intent(inout) :: value
-    type(error_t), allocatable, intent(inout) :: error
-
-    call table%get_real(column, value, error)
-    if (allocated(error)) return
-    if (value <= 0) call table%refuse(column, expected, error)
-    if (.not. is_size(value)) call table%refuse(column, size_text, error)
-  end subroutine read_positive
-
-  !> Read numbers from several columns; a cell that is empty or missing leaves its value, unless it is required.
-  subroutine read_numbers(table, columns, required, values, error)
-    type(csv_table_t), intent(in) :: table
-    integer, intent(in) :: columns(:)
-    logical, intent(in) :: required
-    real(dp), intent(inout) :: values(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: k
-
-    do k = 1, size(columns)
-      if (table%is_empty(columns(k)) .and. .not. required) cycle
-      call table%get_real(columns(k), values(k), error)
-    end do
-  end subroutine read_numbers
-
-  !> Read numbers that are places or velocities, in the same way.
-  subroutine read_quantities(table, columns, required, values, error)
-    type(csv_table_t), intent(in) :: table
-    integer, intent(in) :: columns(:)
-    logical, intent(in) :: required
-    real(dp), intent(inout) :: values(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: k
-
-    call read_numbers(table, columns, required, values, error)
-    if (allocated(error)) return
-    do k = 1, size(columns)
-      if (.not. is_bounded(values(k))) call table%refuse(columns(k), bounded_text, error)
-    end do
-  end subroutine read_quantities
 
   !> All bodies have a mass or none has: with none the masses are left to the caller.
   subroutine settle_masses(comm, path, bodies, error)

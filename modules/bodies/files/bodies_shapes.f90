@@ -12,7 +12,7 @@ module gravier_bodies_shapes
   use gravier_shape_names, only: find_shape, shape_names
   use gravier_bodies_data, only: bodies_data_t
   use gravier_bodies_checks, only: check_numbers, quantity, extent
-  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes, is_fine_turn, fine_turn_text
   implicit none
   private
   public :: read_body_shapes, write_body_shapes
@@ -128,6 +128,12 @@ contains
       call find_axes(file, path, principal, error)
     end if
     if (.not. allocated(error)) then
+      do i = 1, bodies%n
+        if (is_fine_turn(bodies%orientation(:, i))) cycle
+        call raise(error, status_input, path//": /bodies/orientation: id "//to_text(bodies%id(i))//": "// &
+          & to_text(bodies%orientation(1, i))//", but "//fine_turn_text//" was expected")
+        exit
+      end do
       do i = 1, bodies%n
         call settle_turn(bodies%orientation(:, i), possible)
         if (.not. possible) exit

@@ -5,7 +5,11 @@ module gravier_body_turn
   use gravier_bodies_data, only: make_unit
   implicit none
   private
-  public :: settle_turn, settle_radius, take_principal_axes
+  public :: settle_turn, settle_radius, take_principal_axes, is_fine_turn, fine_turn_text
+
+  !> angles beyond it have lost the digits that tell how a body stands [rad]
+  real(dp), parameter :: largest_angle = 1.0e8_dp
+  character(len=*), parameter :: fine_turn_text = "an angle of at most 1e8 in size"
 
   !> what a quaternion may differ from length 1 and be left as it is: rounding of a time stepper, which a file gives back to the bit
   real(dp), parameter :: unit_enough = 1.0e-12_dp
@@ -13,6 +17,13 @@ module gravier_body_turn
   real(dp), parameter :: same_radius = 1.0e-9_dp
 
 contains
+
+  !> Whether a turn has its digits: quaternions have them at any size.
+  pure logical function is_fine_turn(turn)
+    !> (1) in 2D, (4) in 3D
+    real(dp), intent(in) :: turn(:)
+    is_fine_turn = size(turn) == 4 .or. abs(turn(1)) <= largest_angle
+  end function is_fine_turn
 
   !> Scale a quaternion to length 1, unless it has it; angles are left as they are.
   pure subroutine settle_turn(turn, possible)

@@ -11,16 +11,16 @@ module gravier_insertion
   use gravier_radius_distribution, only: radius_distribution_t
   implicit none
   private
-  public :: insertion_t, new_grain_t, candidates_a_grain, insertion_words, insertion_record
+  public :: insertion_t, new_grain_t, candidates_a_grain, most_a_step, insertion_words, insertion_record
 
   !> candidate places of a grain in a step: one bit of a word each
   integer, parameter :: candidates_a_grain = 60
   !> grains of an insertion that may enter in a step
   integer, parameter :: most_a_step = 1000
   !> words of the account of an insertion
-  integer, parameter :: insertion_words = 4
+  integer, parameter :: insertion_words = 5
   !> what they are, in their order: the version of checkpoints, which changes with them
-  character(len=*), parameter :: insertion_record = "entered mass drawn put_off"
+  character(len=*), parameter :: insertion_record = "entered mass drawn put_off held_back"
   !> fraction of a grain that roundings of times take
   real(dp), parameter :: rounding = 1.0e-6_dp
   !> streams of random numbers of an insertion, and how many it has
@@ -74,6 +74,8 @@ module gravier_insertion
     real(dp) :: mass = 0.0_dp
     !> candidate places that have been drawn; steps in which a grain was put off, since none of its places was free
     integer(i8) :: drawn = 0, put_off = 0
+    !> steps in which as many entered as may in a step, and more were owed
+    integer(i8) :: held_back = 0
   contains
     procedure :: grain => insertion_grain
     procedure :: owes => insertion_owes
@@ -149,24 +151,30 @@ contains
     if (self%mass_rate < huge(1.0_dp)) owes = owes .and. mass + (1.0_dp - rounding)*next <= self%mass_rate*duration
   end function insertion_owes
 
-  !> The grains that are owed in a step, as many as may enter in one.
-  pure subroutine insertion_list_owed(self, time, step, grains)
+  !> The grains that are owed in a step, as many as may enter in one, and whether more are owed.
+  pure subroutine insertion_list_owed(self, time, step, grains, more)
     class(insertion_t), intent(in) :: self
     !> at the start of the step, and its length [s]
     real(dp), intent(in) :: time, step
     type(new_grain_t), allocatable, intent(out) :: grains(:)
+    logical, intent(out) :: more
     type(new_grain_t), allocatable :: owed(:)
+    type(new_grain_t) :: next
     real(dp) :: mass
     integer :: n
 
     allocate (owed(most_a_step))
     n = 0
     mass = self%mass
-    do while (n < most_a_step .and. time < self%end)
-      owed(n + 1) = self%grain(self%entered + n + 1)
-      if (.not. self%owes(self%entered + n, mass, owed(n + 1)%mass, time + step)) exit
+    more = .false.
+    do while (time < self%end)
+      next = self%grain(self%entered + n + 1)
+      if (.not. self%owes(self%entered + n, mass, next%mass, time + step)) exit
+      more = n == most_a_step
+      if (more) exit
       n = n + 1
-      mass = mass + owed(n)%mass
+      owed(n) = next
+      mass = mass + next%mass
     end do
     grains = owed(1:n)
   end subroutine insertion_list_owed
@@ -315,6 +323,7 @@ contains
     words(2) = transfer(self%mass, 0_i8)
     words(3) = self%drawn
     words(4) = self%put_off
+    words(5) = self%held_back
   end subroutine insertion_get_state
 
   !> Take an account from the words of a checkpoint, or find out that it is none.
@@ -327,6 +336,7 @@ contains
     self%mass = transfer(words(2), 0.0_dp)
     self%drawn = words(3)
     self%put_off = words(4)
+    self%held_back = words(5)
     ! the word of a mass below 0 is below 0 too
     sound = minval(words) >= 0 .and. is_finite(self%mass)
   end subroutine insertion_set_state

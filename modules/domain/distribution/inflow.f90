@@ -3,6 +3,7 @@
 !> subdomain that holds the place of a grain owns it.
 module gravier_inflow
   use gravier_kinds, only: dp, i8
+  use gravier_finite, only: is_finite
   use gravier_motion, only: grain_inertia
   use gravier_body_store, only: body_set_t, append_bodies
   use gravier_placed_grains, only: sample_box_t, placed_grains_t
@@ -11,7 +12,12 @@ module gravier_inflow
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: inflow_t, placed_t, is_clear
+  public :: inflow_t, placed_t, is_clear, given_words, given_record
+
+  !> words of the account of grains that a loop of the user's own has placed
+  integer, parameter :: given_words = 2
+  !> what they are, in their order: the version of checkpoints, which changes with them
+  character(len=*), parameter :: given_record = "given_entered given_mass"
 
   !> Grains with their centres (nd, n) [m] and materials (n).
   type :: placed_t
@@ -27,7 +33,7 @@ module gravier_inflow
     integer(i8) :: next_id = 1
     !> grains that a loop of the user's own has placed, the same on every rank: they enter in the next step, before all others
     type(placed_t) :: given
-    !> those of them that have entered since this run began or went on from a checkpoint, and their mass [kg]
+    !> those of them that have entered, and their mass [kg]
     integer(i8) :: given_entered = 0
     real(dp) :: given_mass = 0.0_dp
   contains
@@ -45,6 +51,8 @@ module gravier_inflow
   type :: owed_t
     type(new_grain_t), allocatable :: grain(:)
     integer(i8), allocatable :: taken(:)
+    !> it owes more than may enter in a step
+    logical :: more = .false.
   end type owed_t
 
 contains
@@ -94,30 +102,37 @@ contains
     if (self%exists()) mass = mass + sum(self%insertions%mass)
   end function inflow_mass
 
-  !> The accounts of all insertions as words of a checkpoint.
+  !> The accounts of the grains that a loop has placed and of all insertions, as words of a checkpoint.
   pure subroutine inflow_get_state(self, words)
     class(inflow_t), intent(in) :: self
-    !> (insertion_words times insertions)
+    !> (given_words and insertion_words times insertions)
     integer(i8), allocatable, intent(out) :: words(:)
-    integer :: i
+    integer :: i, first
 
-    allocate (words(insertion_words*size(self%insertions)))
+    allocate (words(given_words + insertion_words*size(self%insertions)))
+    words(1) = self%given_entered
+    words(2) = transfer(self%given_mass, 0_i8)
     do i = 1, size(self%insertions)
-      call self%insertions(i)%get_state(words((i - 1)*insertion_words + 1:i*insertion_words))
+      first = given_words + (i - 1)*insertion_words + 1
+      call self%insertions(i)%get_state(words(first:first + insertion_words - 1))
     end do
   end subroutine inflow_get_state
 
   !> Take the accounts from the words of a checkpoint, or find out that they are none.
   pure subroutine inflow_set_state(self, words, sound)
     class(inflow_t), intent(inout) :: self
-    integer(i8), intent(in) :: words(insertion_words*size(self%insertions))
+    integer(i8), intent(in) :: words(given_words + insertion_words*size(self%insertions))
     logical, intent(out) :: sound
     logical :: fine
-    integer :: i
+    integer :: i, first
 
-    sound = self%next_id > 0
+    self%given_entered = words(1)
+    self%given_mass = transfer(words(2), 0.0_dp)
+    ! the word of a mass below 0 is below 0 too
+    sound = self%next_id > 0 .and. minval(words(1:given_words)) >= 0 .and. is_finite(self%given_mass)
     do i = 1, size(self%insertions)
-      call self%insertions(i)%set_state(words((i - 1)*insertion_words + 1:i*insertion_words), fine)
+      first = given_words + (i - 1)*insertion_words + 1
+      call self%insertions(i)%set_state(words(first:first + insertion_words - 1), fine)
       sound = sound .and. fine
     end do
   end subroutine inflow_set_state
@@ -139,7 +154,7 @@ contains
     allocate (owed(size(self%insertions)))
     n = 0
     do i = 1, size(owed)
-      call self%insertions(i)%list_owed(time, step, owed(i)%grain)
+      call self%insertions(i)%list_owed(time, step, owed(i)%grain, owed(i)%more)
       n = n + size(owed(i)%grain)
     end do
     if (n == 0) return
@@ -254,6 +269,7 @@ contains
     logical :: found
     integer :: k, c
 
+    found = .true.
     do k = 1, size(owed%grain)
       associate (grain => owed%grain(k))
         found = .false.
@@ -275,6 +291,7 @@ contains
         insertion%mass = insertion%mass + grain%mass
       end associate
     end do
+    if (found .and. owed%more) insertion%held_back = insertion%held_back + 1
     insertion%drawn = insertion%drawn + int(size(owed%grain), i8)*candidates_a_grain
   end subroutine choose_places
 

@@ -31,6 +31,7 @@ program test_io_bodies_file
   call test_csv_groups()
   call test_csv_refused()
   call test_csv_planes_refused()
+  call test_csv_cells_without_meaning()
   call test_hdf5_refused()
   call test_write_refused()
   call finish_checks()
@@ -490,13 +491,13 @@ contains
     call check_equal(bodies%n_walls, 1, "number of walls without bodies")
   end subroutine test_csv_empty
 
-  !> An empty cell is a free grain; the cell of a plane must be empty or a group, and counts for nothing.
+  !> An empty cell is a free grain; the cell of a plane is empty or 0.
   subroutine test_csv_groups()
     type(bodies_data_t) :: bodies
     type(error_t), allocatable :: error
 
     call put(base//".csv", "id,x,y,radius,group,shape,nx,ny"//lf//"1,0,0,1,3,,,"//lf//"2,0,0,1,,,,"//lf// &
-      & "3,0,0,,4,plane,0,1"//lf//"4,0,0,1,0,,,"//lf//"5,0,0,1,2147483647,,,"//lf)
+      & "3,0,0,,0,plane,0,1"//lf//"4,0,0,1,0,,,"//lf//"5,0,0,1,2147483647,,,"//lf)
     call read_bodies(comm, base//".csv", 2, bodies, error)
     call expect_none(error, "groups in CSV")
     call check(all(bodies%group == merge(3, 0, bodies%id == 1) + merge(huge(1), 0, bodies%id == 5)), "groups")
@@ -597,12 +598,45 @@ contains
     call refuse_plane("1,,0,,plane,0,1", "line 3: column x: empty")
     call refuse_plane("0,0,0,,plane,0,1", 'line 3: column id: "0", but an id >= 1')
     call refuse_plane("1,0,0,inf,plane,0,1", 'line 3: column radius: "inf"')
+    call refuse_plane("1,0,0,0.5,plane,0,1", &
+      & 'line 3: column radius: "0.5", but an empty cell or 0 in the row of a plane was expected')
     call refuse_plane("12,0,0,,plane,0,1", "id 12 appears twice")
     call refuse_plane("2,0,0,,plane,0,1"//lf//"2,0,0,,plane,0,1", "id 2 appears twice")
     call put(base//".csv", "id,x,y,radius,shape"//lf//"1,0,0,,plane"//lf)
     call read_bodies(comm, base//".csv", 2, bodies, error)
     call expect(error, status_input, "a plane needs the columns nx, ny", "a plane without normals")
   end subroutine test_csv_planes_refused
+
+  subroutine refuse_cells(cells, part)
+    character(len=*), intent(in) :: cells, part
+    type(bodies_data_t) :: bodies
+    type(error_t), allocatable :: error
+
+    call put(base//".csv", "id,x,y,radius,shape,nx,ny,vx,omega,mass,group,material"//lf//"11,0,0,1,,0,0,1,1,1,0,1"//lf// &
+      & "12,0,0,0,plane,0,1,0,0,0,0,1"//lf//"13,0,0,1,,,,,,1,,"//lf//"14,0,0,"//cells//lf//"15,0,0,,plane,0,1,,,,,"//lf)
+    call read_bodies(comm, base//".csv", 2, bodies, error)
+    if (part == "") then
+      call expect_none(error, cells)
+    else
+      call expect(error, status_input, part, "CSV with "//cells)
+    end if
+  end subroutine refuse_cells
+
+  !> Cells that mean nothing in their row are empty or 0.
+  subroutine test_csv_cells_without_meaning()
+    character(len=*), parameter :: of_plane = " in the row of a plane"
+
+    call refuse_cells("1,grain,,,,,1,,", "")
+    call refuse_cells("1,grain,0,1,,,1,,", &
+      & 'line 5: column ny: "1", but an empty cell or 0 in the row of a body (normals are of planes) was')
+    call refuse_cells(",plane,0,1,-1,,,,", 'line 5: column vx: "-1", but an empty cell or 0'//of_plane//", which stands still, was")
+    call refuse_cells(",plane,0,1,,2,,,", 'line 5: column omega: "2", but an empty cell or 0'//of_plane)
+    call refuse_cells(",plane,0,1,,,5,,", 'line 5: column mass: "5", but an empty cell or 0'//of_plane)
+    call refuse_cells(",plane,0,1,,,,4,", 'line 5: column group: "4", but an empty cell or 0'//of_plane)
+    call refuse_cells(",plane,0,1,,,,,2", &
+      & 'line 5: column material: "2", but an empty cell or 1'//of_plane//", whose material is "// &
+      & "wall_material of &scene, was expected")
+  end subroutine test_csv_cells_without_meaning
 
   ! ------------------------------------------------------------------------------------------------ refused HDF5
 
@@ -636,6 +670,10 @@ contains
 
     call refuse_hdf5(3_i8, 0.0_dp, 1.0_dp, "id 3 appears twice")
     call refuse_hdf5(0_i8, 0.0_dp, 1.0_dp, "/bodies/id: row 3 (counted from 0): 0, but an id >= 1 was expected")
+    call refuse_hdf5(10_i8**18, 0.0_dp, 1.0_dp, &
+      & "/bodies/id: row 3 (counted from 0): 1000000000000000000, but an id of at most 18 digits was expected")
+    call refuse_hdf5(huge(1_i8), 0.0_dp, 1.0_dp, &
+      & "/bodies/id: row 3 (counted from 0): 9223372036854775807 or more, but an id of at most 18 digits was expected")
     call refuse_hdf5(4_i8, ieee_value(1.0_dp, ieee_quiet_nan), 1.0_dp, "/bodies/position: id 4: NaN or infinity")
     call refuse_hdf5(4_i8, 0.0_dp, ieee_value(1.0_dp, ieee_positive_inf), "/bodies/radius: id 4: NaN or infinity")
     call refuse_hdf5(4_i8, 0.0_dp, 0.0_dp, "/bodies/radius: id 4: 0.00000000E+00, but a number > 0 was expected")

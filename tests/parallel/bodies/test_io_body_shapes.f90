@@ -204,6 +204,13 @@ contains
     call refuse_csv(header, "1,0,0,disk,,,", "line 2: column radius: empty, but a finite number was expected", 2)
     call refuse_csv(header, "1,0,0,brick,,nan,", 'line 2: column angle: "nan", but a finite number was expected', 2)
     call refuse_csv(header, "1,0,0,brick,,1e31,", 'line 2: column angle: "1e31", but a number of at most 1e30 in size', 2)
+    call refuse_csv(header, "1,0,0,brick,,-1.0001e8,", 'line 2: column angle: "-1.0001e8", but an angle of at most 1e8 in size', 2)
+    call refuse_csv(header//",nx,ny", "1,0,0,plane,2,,,0,1", &
+      & 'line 2: column scale: "2", but an empty cell or 0 in the row of a plane', 2)
+    call refuse_csv(header//",nx,ny", "1,0,0,plane,,0.4,,0,1", &
+      & 'line 2: column angle: "0.4", but an empty cell or 0 in the row of', 2)
+    call refuse_csv("id,x,y,z,shape,qw,qx,qy,qz,nx,ny,nz", "1,0,0,0,plane,1,,0,1,0,0,1", &
+      & 'line 2: column qz: "1", but an empty cell or 0 in', 3)
     call refuse_csv("id,x,y,shape", "1,0,0,disk", &
       & 'line 2: column shape: "disk", but a shape (a disk or a sphere needs the column '// &
       & "radius) was expected", 2)
@@ -365,6 +372,8 @@ contains
       & "/bodies/shape: id 2: 2, but a number from 0 to 1, that of the last of its names")
     call refuse_hdf5(-1_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/shape: id 2: -1, but a number from 0 to 1")
     call refuse_hdf5(1_i8, 0.0_dp, 0.0_dp, "brick", "/bodies/scale: id 2: 0.00000000E+00, but a number > 0 was expected")
+    call refuse_hdf5(1_i8, 1.0_dp, 1.0001e8_dp, "brick", &
+      & "/bodies/orientation: id 2: 1.00010000E+08, but an angle of at most 1e8 in size was expected")
     call refuse_hdf5(1_i8, 1.0_dp, 1.0e31_dp, "brick", "/bodies/orientation: id 2: 1.00000000E+31, but a number of at most 1e30")
     call refuse_hdf5(0_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/radius: id 2: 0.00000000E+00, but a number > 0 was expected")
 

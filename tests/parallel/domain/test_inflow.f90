@@ -11,7 +11,7 @@ program test_inflow
   use gravier_surface_registry, only: make_surface
   use gravier_insertion, only: insertion_words, new_grain_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_inflow, only: inflow_t, is_clear
+  use gravier_inflow, only: inflow_t, given_words, is_clear
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: h = 1.0e-3_dp
@@ -269,16 +269,23 @@ contains
     call open_up(2, inflow)
     inflow%insertions(2)%entered = 3
     inflow%insertions(2)%mass = 0.25_dp
+    inflow%given_entered = 5
+    inflow%given_mass = 0.75_dp
     call inflow%get_state(words)
-    call check_equal(size(words), 2*insertion_words, "words of two accounts")
+    call check_equal(size(words), given_words + 2*insertion_words, "words of an account for a loop and of two insertions")
     call open_up(2, again)
     call again%set_state(words, sound)
     call check(sound, "accounts")
-    call check_equal(again%entered(), 3_i8, "grains")
-    call check_close(again%mass(), 0.25_dp, 0.0_dp, "mass")
-    words(insertion_words + 1) = -1
+    call check_equal(again%entered(), 8_i8, "grains, of a loop as well")
+    call check_equal(again%given_entered, 5_i8, "grains of a loop")
+    call check_close(again%mass(), 1.0_dp, 0.0_dp, "mass")
+    words(given_words + insertion_words + 1) = -1
     call again%set_state(words, sound)
     call check(.not. sound, "a damaged account")
+    words(given_words + insertion_words + 1) = 0
+    words(1) = -1
+    call again%set_state(words, sound)
+    call check(.not. sound, "a damaged account of a loop")
   end subroutine test_state
 
 end program test_inflow

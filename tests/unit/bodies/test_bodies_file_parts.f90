@@ -10,7 +10,9 @@ program test_bodies_file_parts
     & refuse_bad_numbers, direction, quantity, extent
   use gravier_bodies_shapes, only: read_body_shapes, write_body_shapes
   use gravier_hdf5_file, only: h5_file_t
-  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes
+  use gravier_csv_table, only: csv_table_t
+  use gravier_bodies_cells, only: read_id, read_number, read_positive, read_quantities, expect_nothing
+  use gravier_body_turn, only: settle_turn, settle_radius, take_principal_axes, is_fine_turn
   use gravier_quaternion, only: multiply_quaternions
   use gravier_shape_library, only: shape_library_t
   use gravier_shapes_file, only: parse_shapes
@@ -27,6 +29,7 @@ program test_bodies_file_parts
   call start_parallel()
   call comm%init()
   call test_ids()
+  call test_cells()
   call test_numbers()
   call test_box()
   call test_refusals()
@@ -85,6 +88,10 @@ contains
     call expect(error, "", "ids on all ranks")
     call check_ids(comm, "here", 0_i8, bad, error)
     call expect(error, "here: row 2", "a bad id on all ranks")
+    call check_own_ids("here", 0_i8, [10_i8**18 - 1], error)
+    call expect(error, "", "an id of 18 digits")
+    call check_own_ids("here", 0_i8, [10_i8**18], error)
+    call expect(error, "here: row 0 (counted from 0): 1000000000000000000, but an id of at most 18 digits", "an id of 19 digits")
     call check_whole(comm, "file", "group", 0, good, good - 1, error)
     call expect(error, "id 4000000000: 3999999999, but a group from 0 to 2147483647", "a number that is too large")
     call check_whole(comm, "file", "material", 1, good(1:2), good(1:2), error)
@@ -92,6 +99,44 @@ contains
     call check_whole(comm, "file", "material", 1, good, bad, error)
     call expect(error, "file: /bodies/material: id 4000000000: 0, but a material from 1", "a number below the least one")
   end subroutine test_ids
+
+  !> Cells of a row with their ranges; those without a meaning are empty or 0.
+  subroutine test_cells()
+    type(csv_table_t) :: table
+    type(error_t), allocatable :: error
+    real(dp) :: value, pair(2)
+    integer(i8) :: id
+    integer :: unit, number
+    logical :: found
+
+    open (newunit=unit, file=scratch("cells.csv"), action="write", status="replace")
+    write (unit, "(a)") "a,b,c,d,e", "5,-1,0,,1e31"
+    close (unit)
+    call table%open(scratch("cells.csv"), error)
+    call table%next_row(found, error)
+    call expect(error, "", "a row")
+    call read_id(table, 1, id, error)
+    call check(id == 5 .and. .not. allocated(error), "an id")
+    call read_id(table, 3, id, error)
+    call expect(error, 'column c: "0", but an id >= 1', "an id of 0")
+    call read_number(table, 4, "a material", 1, number, error)
+    call check(number == 1 .and. .not. allocated(error), "an empty number is the least")
+    call read_number(table, 2, "a group", 0, number, error)
+    call expect(error, 'column b: "-1", but a group from 0', "a number below the least")
+    call read_positive(table, 1, "a mass > 0", value, error)
+    call check_close(value, 5.0_dp, 0.0_dp, "a mass")
+    call read_positive(table, 3, "a mass > 0", value, error)
+    call expect(error, 'column c: "0", but a mass > 0', "a mass of 0")
+    call read_quantities(table, [2, 4], .false., pair, error)
+    call check_close(pair(1), -1.0_dp, 0.0_dp, "a quantity beside an empty cell")
+    call read_quantities(table, [1, 5], .true., pair, error)
+    call expect(error, 'column e: "1e31", but', "a quantity that is too large")
+    call expect_nothing(table, [3, 4, 0], "a stone", error)
+    call expect(error, "", "0, an empty cell, and a column that is not there")
+    call expect_nothing(table, [3, 2], "a stone", error)
+    call expect(error, 'line 2: column b: "-1", but an empty cell or 0 in the row of a stone', "a cell without meaning")
+    call table%close()
+  end subroutine test_cells
 
   subroutine test_numbers()
     real(dp) :: nan, infinity
@@ -217,6 +262,9 @@ contains
     call settle_turn(angle, possible)
     call check(possible, "any angle is a turn")
     call check_close(angle(1), 7.5_dp, 0.0_dp, "and left as it is")
+    call check(is_fine_turn(angle) .and. is_fine_turn([-1.0e8_dp]), "angles with their digits")
+    call check(.not. is_fine_turn([1.0001e8_dp]), "an angle without its digits")
+    call check(is_fine_turn(1.0e20_dp*quarter), "quaternions of any length have their digits")
     call take_principal_axes(quarter, angle)
     call check_close(angle(1), 7.5_dp, 0.0_dp, "as are angles by turns of axes")
     turn(:) = quarter

@@ -2,7 +2,7 @@
 program test_insertion
   use gravier_kinds, only: dp, i8
   use gravier_motion, only: grain_mass, grain_volume
-  use gravier_insertion, only: insertion_t, new_grain_t, insertion_words, candidates_a_grain
+  use gravier_insertion, only: insertion_t, new_grain_t, insertion_words, candidates_a_grain, most_a_step
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   !> length of a step [s]
@@ -41,10 +41,11 @@ contains
     type(insertion_t), intent(inout) :: insertion
     integer, intent(in) :: steps
     type(new_grain_t), allocatable :: owed(:)
+    logical :: more
     integer :: step, k
 
     do step = 0, steps - 1
-      call insertion%list_owed(step*h, h, owed)
+      call insertion%list_owed(step*h, h, owed, more)
       do k = 1, size(owed)
         call check_equal(owed(k)%number, insertion%entered + 1, "grains come in the order of their numbers")
         insertion%entered = insertion%entered + 1
@@ -220,12 +221,21 @@ contains
     type(insertion_t) :: insertion
     type(new_grain_t), allocatable :: owed(:)
     real(dp) :: mass
+    logical :: more
 
     insertion = box_of(2)
     insertion%rate = 1000.0_dp
     call check_equal(insertion%grains_behind(0.01_dp), 10_i8, "grains behind")
-    call insertion%list_owed(0.01_dp, h, owed)
+    call insertion%list_owed(0.01_dp, h, owed, more)
     call check_equal(size(owed), 11, "they are owed in the next step")
+    call check(.not. more, "and no others")
+    insertion%rate = 1.0e6_dp
+    call insertion%list_owed(0.0_dp, h, owed, more)
+    call check(size(owed) == most_a_step .and. .not. more, "as many as may enter in a step")
+    insertion%rate = 1.001e6_dp
+    call insertion%list_owed(0.0_dp, h, owed, more)
+    call check(size(owed) == most_a_step .and. more, "one more")
+    insertion%rate = 1000.0_dp
     insertion%most_grains = 4
     call check_equal(insertion%grains_behind(0.01_dp), 4_i8, "as far as they are to enter")
     insertion%entered = 4
@@ -251,6 +261,7 @@ contains
     insertion%mass = 3.5_dp
     insertion%drawn = 20_i8*candidates_a_grain
     insertion%put_off = 2
+    insertion%held_back = 3
     call insertion%get_state(words)
     again = box_of(2)
     call again%set_state(words, sound)
@@ -259,6 +270,7 @@ contains
     call check_close(again%mass, 3.5_dp, 0.0_dp, "mass")
     call check_equal(again%drawn, insertion%drawn, "places drawn")
     call check_equal(again%put_off, 2_i8, "steps put off")
+    call check_equal(again%held_back, 3_i8, "steps in which more were to enter than may")
     do k = 1, insertion_words
       damaged(:) = words
       damaged(k) = -1
