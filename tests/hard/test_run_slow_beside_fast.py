@@ -98,10 +98,10 @@ class SlowBesideFast(RunTestCase):
     def test_elastic_gas(self):
         """The energy of a gas of disks that lose none in impacts stays, in thousands of impacts."""
         rng = np.random.default_rng(4)
-        grains = [Grain((0.03 * (k % 10 + 0.5), 0.03 * (k // 10 + 0.5)), rng.uniform(-3.0, 3.0, 2), radius=RADIUS, mass=1.0) for k in range(100)]
+        grains = [Grain((0.0213 * (k % 10 + 0.5), 0.0213 * (k // 10 + 0.5)), rng.uniform(-3.0, 3.0, 2), radius=RADIUS, mass=1.0) for k in range(100)]
         run = self.play("gas", bodies_csv(grains), {
             "scene": {"restitution": 1.0, "friction": 0.0, "gravity": [0.0, 0.0]},
-            "boundary": [plane([0, 0], [1, 0]), plane([0, 0], [0, 1]), plane([0.3, 0.3], [-1, 0]), plane([0.3, 0.3], [0, -1])],
+            "boundary": [plane([0, 0], [1, 0]), plane([0, 0], [0, 1]), plane([0.213, 0.213], [-1, 0]), plane([0.213, 0.213], [0, -1])],
             "time": {"step": 1e-4, "steps": 5000}, "output": {"directory": "results", "every": 5000}})
         self.assert_status(run, 0)
         energy = run.history()["kinetic_energy"]

@@ -42,7 +42,7 @@ module gravier_velocity_scale
 
   !> of what bonds could give to the mean grain in a step: motion as a whole says nothing of the forces that bonds have to bear
   real(dp), parameter :: share_of_bonds = 0.2_dp
-  !> part of U below which the own scale of a body makes it a slow one, and the least own scale, over U
+  !> part of U below which the own scale of a body makes it a slow one; the least own scale over U, where U_q is 0
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
@@ -297,10 +297,11 @@ contains
     !> velocity of the observer [m/s]
     real(dp), intent(in) :: frame(3)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: v(problem%kernels%nd), own, limit
+    real(dp) :: v(problem%kernels%nd), own, limit, least
     integer :: s, b
 
     limit = slow_part*self%value
+    least = merge(self%quiet, least_own*self%value, self%quiet > 0.0_dp)
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         if (allocated(sub%concern)) deallocate (sub%concern)
@@ -308,7 +309,7 @@ contains
         allocate (sub%concern(sub%n_bodies), source=1.0_dp)
         do b = 1, sub%n_grains
           call find_own_velocity(sub, physics, b, v)
-          own = max(self%quiet, self%share*norm2(v - frame(1:size(v))), least_own*self%value)
+          own = max(least, self%share*norm2(v - frame(1:size(v))))
           if (own >= limit) cycle
           sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
         end do

@@ -60,6 +60,7 @@ program test_velocity_scale
     call test_drives(nd)
     call test_own(nd)
     call test_stress(nd)
+    call test_slow_bodies(nd)
     call test_applied(nd)
     call test_given(nd)
     call test_ranks(nd)
@@ -350,6 +351,63 @@ contains
     call press(sim, 3.0e3_dp)
     call check(sim%velocity_scale%kind /= "contact forces", "grains that are driven and press")
   end subroutine test_stress
+
+  !> Slow grains among fast ones: their errors count as the square of a quarter of the scale over their own one. Where nothing moves,
+  !> and of fast grains, no error counts more than others.
+  subroutine test_slow_bodies(nd)
+    integer, intent(in) :: nd
+    type(scene_t) :: scene
+    type(simulation_t) :: sim
+    real(dp) :: area(4), u, own, wanted
+    integer :: s, b, slow
+
+    scene = scene_t(nd=nd, gravity=1.0e-3_dp*g)
+    call assemble(comm, scene, sim)
+    do s = 1, size(sim%problem%sub)
+      call check(.not. allocated(sim%problem%sub(s)%concern), "nothing moves")
+    end do
+    scene%motion = 32.0_dp
+    call assemble(comm, scene, sim)
+    area(:) = 1.0_dp
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_grains
+          ! every third grain has 0 to a tenth of its velocity
+          if (mod(sub%id(b), 3_i8) == 0) sub%v_free(1:nd, b) = 0.1_dp*mod(sub%id(b), 2_i8)*sub%v_free(1:nd, b)
+        end do
+      end associate
+    end do
+    call sim%velocity_scale%measure(sim%decomposition, sim%physics, sim%problem, step, area(1:size(sim%decomposition%boundaries)))
+    call check_equal(trim(sim%velocity_scale%kind), "motion of the bodies", "some are slow: which rules")
+    u = sim%velocity_scale%value
+    slow = 0
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do b = 1, sub%n_grains
+          own = speed_of(sim, s, b)
+          own = max(0.3_dp*own, 1.0e-3_dp*g*step)
+          wanted = max(1.0_dp, (0.25_dp*u/own)**2)
+          if (wanted > 1.0_dp) slow = slow + 1
+          call check_close(sub%concern(b), wanted, 1.0e-10_dp*wanted, "how much the error of a grain counts")
+        end do
+      end associate
+    end do
+    call check(slow > 0 .or. size(sim%problem%sub) == 0, "some are slow")
+  end subroutine test_slow_bodies
+
+  !> Speed of a grain at the start of a step under gravity along the last axis [m/s].
+  real(dp) function speed_of(sim, s, b) result(speed)
+    type(simulation_t), intent(in) :: sim
+    integer, intent(in) :: s, b
+    real(dp) :: v(3)
+    integer :: d
+
+    do d = 1, nd
+      v(d) = sim%problem%sub(s)%v_free(d, b)
+    end do
+    v(nd) = v(nd) + 1.0e-3_dp*g*step
+    speed = norm2(v(1:nd))
+  end function speed_of
 
   !> Give every second contact a normal impulse, and measure the scale anew.
   subroutine press(sim, impulse)
