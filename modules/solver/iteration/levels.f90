@@ -158,7 +158,7 @@ contains
         parts(n + 1:2*n, s) = sum(crossing(2, :, 1:), dim=1)
         do b = 1, sub%n_grains
           l = part%depth(b)
-          if (l == 0) cycle
+          if (l < 1) cycle
           heavy = 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
           if (allocated(sub%concern)) heavy = sub%concern(b)*heavy
           parts(2*n + l, s) = parts(2*n + l, s) + heavy
