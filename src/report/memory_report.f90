@@ -172,7 +172,6 @@ contains
       call item%add("owned", 4, 1)
       call item%add("place", 4, 1)
       call item%add("multiplicity", 4, 1)
-      call item%add("concern", 8, 1)
       call item%add("radius", 8, 1)
       call item%add("v_free", 8, kernels%nv)
       if (simulation%physics%laws%attracts) call item%add("attraction_load", 8, kernels%nv)

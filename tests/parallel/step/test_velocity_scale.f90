@@ -358,7 +358,7 @@ contains
     integer, intent(in) :: nd
     type(scene_t) :: scene
     type(simulation_t) :: sim
-    real(dp) :: area(4), u, own, wanted
+    real(dp) :: area(8), u, own, wanted
     integer :: s, b, slow
 
     scene = scene_t(nd=nd, gravity=1.0e-3_dp*g)

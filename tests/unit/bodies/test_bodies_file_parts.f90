@@ -127,6 +127,7 @@ contains
     call check_close(value, 5.0_dp, 0.0_dp, "a mass")
     call read_positive(table, 3, "a mass > 0", value, error)
     call expect(error, 'column c: "0", but a mass > 0', "a mass of 0")
+    pair(:) = 0.0_dp
     call read_quantities(table, [2, 4], .false., pair, error)
     call check_close(pair(1), -1.0_dp, 0.0_dp, "a quantity beside an empty cell")
     call read_quantities(table, [1, 5], .true., pair, error)
