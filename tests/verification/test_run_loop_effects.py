@@ -218,7 +218,7 @@ with gravier.Simulation(case, quiet=True) as s:
     def test_bodies_set_on_some_ranks(self):
         """A rank without a subdomain sets nothing, and one may set what it wants to: the same bits as on one rank. Grains that sleep wake on
         all ranks."""
-        groups = merged(HEAP, {"solver": {"sleeping": True, "tolerance": 1e-3}, "time": {"steps": 910}, "output": {"every": 300}})
+        groups = merged(HEAP, {"solver": {"sleeping": True, "tolerance": 1e-3}, "time": {"steps": 1210}, "output": {"every": 300}})
         script = """
 with gravier.Simulation(case, quiet=True, forces=True) as s:
     while s.goes_on:
@@ -227,7 +227,7 @@ with gravier.Simulation(case, quiet=True, forces=True) as s:
             if s.made == 10 and 1 in part.id:
                 part.velocity = np.where((part.id == 1)[:, None], [0.1, 1.0], part.velocity)
                 part.spin = np.where((part.id == 1)[:, None], 3.0, part.spin)
-            if s.made == 900 and 48 in part.id:
+            if s.made == 1200 and 48 in part.id:
                 part.force = np.where((part.id == 48)[:, None], [0.0, 1.0], 0.0)
 """
         for subdomains in (1, 2):
@@ -235,8 +235,8 @@ with gravier.Simulation(case, quiet=True, forces=True) as s:
             runs = [self.play(f"some{subdomains}_{ranks}", case, script, ranks=ranks) for ranks in (1, 2)]
             self.same(*runs)
             asleep = runs[0].history()["sleeping"]
-            self.assertGreater(asleep[899], 20)
-            self.assertEqual(asleep[900], 0)
+            self.assertGreater(asleep[1199], 20)
+            self.assertEqual(asleep[1200], 0)
 
     def test_bodies_come_and_go(self):
         script = """

@@ -285,7 +285,7 @@ class MeshWalls(RunTestCase):
         rows += [body("cube", [0.13 * i, 0.13 * j, 0.42], turn=[1.0, 0.2, 0.1 * i, 0.3]) for i in (-0.5, 0.5) for j in (-0.5, 0.5)]
         directory = prepare(self.here("bowl"), 3, rows)
         write(os.path.join(directory, "wall.stl"), stl_text(quadrangles(bowl)))
-        case = shaped_case(3, [MESH], {"scene": {"friction": 0.5}, "time": {"step": 2e-3, "steps": 700}, "output": {"every": 100}})
+        case = shaped_case(3, [MESH], {"scene": {"friction": 0.5}, "time": {"step": 2e-3, "steps": 1000}, "output": {"every": 100}})
         run = run_case(case, 1, directory)
         self.assertIn(run.status, (0, 3), str(run))
         history = run.history()
