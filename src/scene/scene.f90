@@ -26,7 +26,7 @@ module gravier_scene
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_run_memory, only: check_planned_grains, check_read_grains, check_entering_grains
   use gravier_sample_bodies, only: make_lattice, make_sample, farthest_place
-  use gravier_scene_boundaries, only: make_boundaries, check_any_bodies, check_pressures
+  use gravier_scene_boundaries, only: make_boundaries, check_pressures
   use gravier_scene_insertions, only: make_insertions, check_regions
   use gravier_scene_regions, only: check_mean_regions
   implicit none
@@ -98,7 +98,6 @@ contains
     call check_exact_solution(config, error)
     if (allocated(error)) return
     call make_boundaries(comm, config, data, scene%boundaries, error)
-    call check_any_bodies(config, data%total, scene%boundaries, error)
     if (allocated(error)) return
     scene%n_walls = data%n_walls
     call set_period(config%scene, data, scene)

@@ -14,7 +14,7 @@ module gravier_scene_boundaries
   use gravier_config_laws, only: material_number
   implicit none
   private
-  public :: make_boundaries, check_any_bodies, check_pressures, check_pressed
+  public :: make_boundaries, check_pressures, check_pressed
 
 contains
 
@@ -65,23 +65,6 @@ contains
       if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
-
-  !> Refuse a bodies file without a body where no grains enter and no boundary moves: such a run does nothing.
-  subroutine check_any_bodies(config, total, boundaries, error)
-    type(config_t), intent(in) :: config
-    !> bodies of the file
-    integer(i8), intent(in) :: total
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(error_t), allocatable, intent(inout) :: error
-    integer :: b
-
-    if (allocated(error) .or. config%scene%bodies /= "file" .or. total > 0 .or. size(config%insertions) > 0) return
-    do b = 1, size(boundaries)
-      if (boundaries(b)%is_moved() .or. boundaries(b)%is_driven() .or. allocated(boundaries(b)%table%has)) return
-    end do
-    call raise(error, status_input, trim(config%scene%bodies_file)//": no body; expected one at least, or an &insertion or a "// &
-      & "&boundary that moves in "//config%file)
-  end subroutine check_any_bodies
 
   !> The name of a wall of a bodies file, a lattice or a sample.
   pure function wall_name(id) result(name)

@@ -309,8 +309,6 @@ CSV_FILES = [
     ("normal of a grain", changed("1.0,grain,,\n9", "1.0,grain,0,1\n9"), ("line 5", "column ny", '"1"', "an empty cell or 0 in the row of a body")),
     ("mass of a plane", changed(",,,plane", ",,5,plane"), ("line 6", "column mass", '"5"', "an empty cell or 0 in the row of a plane")),
     ("speed of a plane", changed(",,,plane", ",-1,,plane"), ("line 6", "column vx", '"-1"', "a plane, which stands still")),
-    ("a header alone", "id,x,y,radius\n", ("bodies.csv: no body; expected one at least, or an &insertion or a &boundary that moves in case.nml",)),
-    ("a plane alone", "id,x,y,radius,shape,nx,ny\n9,0,0,,plane,0,1\n", ("bodies.csv: no body",)),
     ("short row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9"), ("line 5", "2 cells", "header has 9")),
     ("long row", changed("4,0.9,0.1,0.1,0.0,1.0,grain,,", "4,0.9,0.1,0.1,0.0,1.0,grain,,,"), ("line 5", "10 cells", "9")),
     ("group of no boundary", "id,x,y,radius,group\n1,0.0,0.1,0.1,0\n2,0.3,0.1,0.1,3\n",

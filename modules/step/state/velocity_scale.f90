@@ -10,11 +10,11 @@
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
-!>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean square of
-!>            the normal impulses that the step starts from, over m
+!>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
+!>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
-!>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else stress;
-!>            f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
+!>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else
+!>            stress; f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
 !> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other.
 module gravier_velocity_scale
   use gravier_kinds, only: dp
@@ -32,10 +32,11 @@ module gravier_velocity_scale
 
   !> share of the motion that goes on which an error may be compared with
   real(dp), parameter :: share_of_own = 0.3_dp
-  !> f, at least, where contacts send velocities back: errors of solves add energy, which impacts that lose none never take away again
+  !> f, at least, where contacts send velocities back: errors of solves add energy, which impacts that lose none never take away
+  !> again
   real(dp), parameter :: least_lost = 0.05_dp
-  !> part of what the impulses of a step would give to the mean grain, below which the motion is that of wedged bodies; impacts leave
-  !> half of it and more
+  !> part of what the impulses of a step would give to the mean grain, below which the motion is that of wedged bodies; impacts
+  !> leave half of it and more
   real(dp), parameter :: little_motion = 0.2_dp
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp

@@ -352,8 +352,8 @@ contains
     call check(sim%velocity_scale%kind /= "contact forces", "grains that are driven and press")
   end subroutine test_stress
 
-  !> Slow grains among fast ones: their errors count as the square of a quarter of the scale over their own one. Where nothing moves,
-  !> and of fast grains, no error counts more than others.
+  !> Slow grains among fast ones: their errors count as the square of a quarter of the scale over their own one. Where nothing
+  !> moves, and of fast grains, no error counts more than others.
   subroutine test_slow_bodies(nd)
     integer, intent(in) :: nd
     type(scene_t) :: scene
