@@ -27,7 +27,7 @@ module gravier_sleeping
   use gravier_borne_impulses, only: contacts_t, find_seen, leave_out
   implicit none
   private
-  public :: sleeping_rule_t, count_rest, may_push, momentum_of, carried_momentum
+  public :: sleeping_rule_t, count_rest, may_push, momentum_of
 
   !> momentum of a body at rest with what may change while it sleeps, and changes of the impulses on it in a step, over the normal
   !> impulses on it

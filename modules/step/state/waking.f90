@@ -13,7 +13,7 @@ module gravier_waking
   use gravier_body_mass, only: add_inverse_mass
   use gravier_pair_laws, only: boundary_of
   use gravier_borne_impulses, only: contacts_t, impulses_t, find_borne
-  use gravier_sleeping, only: may_push, momentum_of, carried_momentum
+  use gravier_sleeping, only: may_push, momentum_of
   implicit none
   private
   public :: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
@@ -138,7 +138,7 @@ contains
       allocate (every(s)%are(problem%sub(s)%n_contacts), source=.true.)
     end do
     call find_borne(decomposition, halo, problem, every, .false., borne)
-    call wake_moved(decomposition, physics, problem, borne, woken)
+    call wake_moved(decomposition, physics, problem%kernels%nw, borne, woken)
     woken = decomposition%comm%any_true(woken)
     if (.not. woken) return
     call halo%refresh(decomposition)
@@ -150,12 +150,12 @@ contains
     end do
   end subroutine wake_disturbed
 
-  !> Wake the grains of this rank that would get too large a momentum: what they had when they fell asleep, or what boundaries that
-  !> move now would give them.
-  subroutine wake_moved(decomposition, physics, problem, borne, woken)
+  !> Wake the grains of this rank that would get too large a momentum.
+  subroutine wake_moved(decomposition, physics, nw, borne, woken)
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
-    type(contact_problem_t), intent(in) :: problem
+    !> rows of an inverse mass
+    integer, intent(in) :: nw
     !> impulses of the contacts that were solved
     type(impulses_t), intent(in) :: borne(:)
     logical, intent(out) :: woken
@@ -166,8 +166,7 @@ contains
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
           if (.not. owned%sleeps(k)) cycle
-          if (.not. momentum_under(owned, k, borne(s)%on(:, k)) > min(owned%wakes_at(k), &
-            & carried_momentum(problem, owned%mass(k)))) cycle
+          if (.not. momentum_under(owned, k, borne(s)%on(:, k)) > owned%wakes_at(k)) cycle
           call owned%wake(k)
           woken = .true.
         end do
@@ -183,7 +182,7 @@ contains
       !> (nv)
       real(dp), intent(in) :: impulse(:)
       real(dp), dimension(size(impulse)) :: v, total
-      real(dp) :: inverse(problem%kernels%nw)
+      real(dp) :: inverse(nw)
 
       v(:) = 0.0_dp
       total(:) = bodies%held(1:size(v), k) + impulse

@@ -63,6 +63,7 @@ contains
   !> a M b and x M^-1 y against each other, and the six products of three impulses.
   subroutine test_products()
     real(dp) :: a(6), b(6), p(6), q(6), sums(6), inverse_mass(4, 2), x(6, 2), y(6, 2), z(6, 2)
+    real(dp) :: factors(2)
     integer :: copies(2), k
 
     a(:) = [1.0_dp, -2.0_dp, 3.0_dp, 0.5_dp, 4.0_dp, -1.0_dp]
@@ -90,6 +91,11 @@ contains
     call check_close(sums(4), 1.5_dp*dot_product(a, a), 10*rounding, "x with z")
     call check_close(sums(5), 1.5_dp*dot_product(a, b), rounding, "y with z")
     call check_close(sums(6), 1.5_dp*inverse_product(sphere, a, a), 10*rounding, "z with z")
+    ! of masses with factors: 1/4 of the first body, 1/2 of the half of the second one
+    factors(:) = [4.0_dp, 2.0_dp]
+    call inverse_products(inverse_mass, copies, x, y, z, sums, factors)
+    call check_close(sums(2), 0.5_dp*4.0_dp, rounding, "x with y, with factors of the masses")
+    call check_close(sums(6), 0.5_dp*inverse_product(sphere, a, a), 10*rounding, "z with z, with factors of the masses")
   end subroutine test_products
 
   subroutine test_all_bodies()
