@@ -12,9 +12,9 @@ module gravier_fallback
   private
   public :: fallback_t
 
-  !> iterations of a solve that was taken over, at most: tens of factorisations bring most of them to their goal, and where
-  !> friction leaves velocities undetermined thousands do not
-  !> Solves that ended at `max_iterations` are taken over after as many, too; fewer are a bound that the user has set.
+  !> Most iterations of the second method. Tens of factorisations bring most solves to their goal. Where friction leaves velocities
+  !> undetermined, thousands of iterations do not help either. A solve that ended at `max_iterations` is taken over if it made at
+  !> least so many itself; a smaller limit is one that the user has set on purpose.
   integer, parameter :: most_iterations = 2000
 
   type :: fallback_t
@@ -92,7 +92,7 @@ contains
     type(solve_report_t), intent(in) :: second, first
 
     is_better = second%status == solve_converged
-    ! figures of a solve that diverged are no numbers
+    ! the figure of a solve that diverged may be NaN
     if (is_better .or. second%status == solve_diverged) return
     is_better = second%figure < first%figure
   end function is_better

@@ -32,18 +32,19 @@ module gravier_velocity_scale
 
   !> share of the motion that goes on which an error may be compared with
   real(dp), parameter :: share_of_own = 0.3_dp
-  !> f, at least, where contacts send velocities back: errors of solves add energy, which impacts that lose none never take away
-  !> again
+  !> The smallest value of f = sqrt(1 - e^2). It is small because errors of solves add energy, which impacts that lose none never
+  !> take away again.
   real(dp), parameter :: least_lost = 0.05_dp
-  !> part of what the impulses of a step would give to the mean grain, below which the motion is that of wedged bodies; impacts
-  !> leave half of it and more
+  !> Bodies count as wedged if they move by less than this part of the velocity that the impulses of a step would give to the mean
+  !> grain. After impacts they move by half of it and more.
   real(dp), parameter :: little_motion = 0.2_dp
   !> diameters by which grains may drift in the simulated time
   real(dp), parameter :: drift = 0.01_dp
 
-  !> of what bonds could give to the mean grain in a step: motion as a whole says nothing of the forces that bonds have to bear
+  !> The part of the velocity that bonds could give to the mean grain in a step which U may have at most: the motion as a whole says
+  !> nothing of the forces that bonds have to bear.
   real(dp), parameter :: share_of_bonds = 0.2_dp
-  !> part of U below which the own scale of a body makes it a slow one; the least own scale over U, where U_q is 0
+  !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
