@@ -213,6 +213,26 @@ class Cell(RunTestCase):
         self.assertAlmostEqual(np.mean(history["stress_xz"][late]), -0.05, delta=0.03)
         self.assertLess(np.max(np.abs(history["energy_error"])), 1e-11 * np.max(np.abs(history["boundary_work"])))
 
+    def test_jammed(self):
+        """A jammed packing that is sheared very slowly: impulses that press it together move hardly any grain, and the cell as a whole. Solves
+        end after a few iterations, and the stresses of all steps are those that are held, but for the 2 % that a slip adds for a few steps."""
+        here = self.here("jammed")
+        packing = {"scene": {"bodies": "sample", "friction": 0.3, "gravity": [0.0, 0.0], "period": [0.3, 0.3], "cell_pressure": [100.0, 100.0]},
+                   "sample": {"count": 150, "radii": "uniform", "radius_min": 0.008, "radius_max": 0.012, "box": [0.3, 0.3],
+                              "arrangement": "loose"},
+                   "time": {"step": 1e-3, "steps": 1500},
+                   "output": {"directory": "packed", "every": 0, "final_bodies": True, "final_forces": True}}
+        self.assert_status(run_case(packing, directory=here), 0)
+        shear = {"scene": {**packing["scene"], "bodies": "file", "bodies_file": "packed/final_bodies.h5", "cell_shear_rate": [1e-8]},
+                 "time": {"step": 1e-3, "steps": 400}, "output": {"directory": "results", "every": 1, "stress": True}}
+        shear["scene"].pop("period")
+        run = run_case(shear, directory=here)
+        self.assert_status(run, 0)
+        history = run.history()
+        self.assertLess(np.mean(history["iterations"]), 20)
+        for component in ("xx", "yy"):
+            np.testing.assert_allclose(history[f"stress_{component}"], 100.0, rtol=0, atol=5.0)
+
     def test_refused(self):
         """What does not go with a cell that moves is refused by one line."""
         here = self.here("refused")

@@ -18,6 +18,7 @@ module gravier_test_impulses
   use gravier_contact_kernels, only: lanes
   use gravier_body_mass, only: inverse_products
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
+  use gravier_cell_response, only: virial_of
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
   use gravier_vain_impulses, only: kept_impulses_t
@@ -43,6 +44,8 @@ module gravier_test_impulses
     real(dp), allocatable :: previous(:, :, :)
     !> where contacts attract, the impulses on the bodies (lanes, nc, blocks) [N s], and H of them (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: on_bodies(:, :, :), load(:, :)
+    !> P - r of the contacts where stresses drive the cell, else of no block (lanes, nc, blocks) [N s]
+    real(dp), allocatable :: kept(:, :, :)
   end type test_part_t
 
   !> What test impulses find.
@@ -141,14 +144,16 @@ contains
     !> of the subdomains of this rank
     type(level_part_t), intent(inout) :: levels(:)
     type(projection_t), intent(out) :: found
-    real(dp) :: parts(n_sums, size(problem%sub)), sums(n_sums), largest(1)
+    !> the sums, and the virials of the tests, one after the other
+    real(dp) :: parts(n_sums + n_tests*count(problem%cell%driven), size(problem%sub)), largest(1)
+    real(dp) :: sums(size(parts, 1))
     integer :: s
 
     parts(:, :) = 0.0_dp
     largest(1) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), part => self%part(s))
-        call make_room(part, problem%kernels%nv, sub%n_columns, size(sub%hot, 3), levels(s)%power)
+        call make_room(part, problem, sub, levels(s)%power)
         if (problem%rest_is_admissible) parts(n_residual_sums, s) = sub%product_of(sub%v_global, sub%v_global)
         if (allocated(sub%attraction)) call take_attractions_off(sub, part)
         if (sub%n_contacts == 0) cycle
@@ -165,7 +170,7 @@ contains
     if (problem%n_subdomains > 1) call sum_motions(problem, self%part)
     do s = 1, size(problem%sub)
       ! the products (h_i, h_j)_M of the velocities h = M^-1 H y, i <= j
-      associate (sub => problem%sub(s), part => self%part(s), products => parts(at_products + 1:, s))
+      associate (sub => problem%sub(s), part => self%part(s), products => parts(at_products + 1:n_sums, s))
         if (allocated(part%load)) then
           call inverse_products(sub%inverse_mass, sub%multiplicity(1:sub%n_bodies), part%local, part%load, part%recent, &
             & products, sub%concern)
@@ -180,19 +185,24 @@ contains
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     call problem%take_residual(sums(1:n_residual_sums), found%residual, found%defect)
-    found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:))
+    if (problem%cell%is_driven) call add_cell(problem, sums(n_sums + 1:), sums(at_products + 1:n_sums))
+    found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:n_sums))
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
 
   !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
-  subroutine make_room(part, nv, n_columns, n_blocks, power)
+  subroutine make_room(part, problem, sub, power)
     type(test_part_t), intent(inout) :: part
-    integer, intent(in) :: nv, n_columns, n_blocks
+    type(contact_problem_t), intent(in) :: problem
+    type(subproblem_t), intent(in) :: sub
     real(dp), allocatable, intent(inout) :: power(:, :)
 
     if (.not. allocated(part%local)) then
-      allocate (part%local(nv, n_columns), part%recent(nv, n_columns))
-      allocate (power(lanes, n_blocks))
+      associate (blocks => size(sub%hot, 3))
+        allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
+        allocate (power(lanes, blocks))
+        allocate (part%kept(lanes, problem%kernels%nc, merge(blocks, 0, problem%cell%is_driven)))
+      end associate
     end if
     part%local(:, :) = 0.0_dp
     part%recent(:, :) = 0.0_dp
@@ -236,13 +246,54 @@ contains
 
       associate (sub => problem%sub(s))
         call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, on_bodies, previous, &
-          & power, part%local, part%recent, found, largest)
+          & power, part%local, part%recent, part%kept, found, largest)
+        sums(1:3) = found(1:3)
+        sums(at_powers + 1:at_products) = found(4:)
+        if (problem%cell%is_driven) call find_virials(sub, problem%kernels%nf, part%kept, on_bodies, previous, sums(n_sums + 1:))
       end associate
-      sums(1:3) = found(1:3)
-      sums(at_powers + 1:at_products) = found(4:)
     end subroutine test_with
 
   end subroutine test
+
+  !> The virials of the tests of a subdomain.
+  pure subroutine find_virials(sub, nf, local, on_bodies, previous, virials)
+    type(subproblem_t), intent(in) :: sub
+    !> components of an impulse that are a force's
+    integer, intent(in) :: nf
+    !> (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: local(:, :, :), on_bodies(:, :, :), previous(:, :, :)
+    !> (components that stresses drive, tests) [N m s]
+    real(dp), intent(out) :: virials(size(sub%cell%lever, 3), n_tests)
+    real(dp) :: before(size(virials, 1))
+
+    virials(:, 1) = virial_of(sub, nf, local)
+    virials(:, 2) = virial_of(sub, nf, on_bodies)
+    virials(:, 3) = virial_of(sub, nf, sub%impulse)
+    before(:) = virial_of(sub, nf, previous)
+    virials(:, 3) = virials(:, 3) - before
+  end subroutine find_virials
+
+  !> Add to the products of the velocities of tests what the cell has of them.
+  pure subroutine add_cell(problem, virials, products)
+    type(contact_problem_t), intent(in) :: problem
+    !> (components that stresses drive, tests) [N m s]
+    real(dp), intent(in) :: virials(count(problem%cell%driven), n_tests)
+    !> columns of the upper triangle of G [J]
+    real(dp), intent(inout), contiguous :: products(:)
+    real(dp) :: inertia(size(virials, 1))
+    integer :: i, j, k, at
+
+    inertia(:) = pack(problem%cell%inertia, problem%cell%driven)
+    at = 0
+    do j = 1, n_tests
+      do i = 1, j
+        at = at + 1
+        do k = 1, size(inertia)
+          products(at) = products(at) + virials(k, i)*virials(k, j)/inertia(k)
+        end do
+      end do
+    end do
+  end subroutine add_cell
 
   !> Sum H y over the copies of bodies; that of the impulses themselves is the reaction, which is summed. Collective.
   subroutine sum_motions(problem, part)

@@ -96,7 +96,8 @@ module gravier_kernel_table
     !> What the estimate of the velocity error needs (gravier_velocity_error), w = W (P - r) being the velocity by which a contact
     !> misses its law and W its undivided local operator: r . w of each contact, H y of the test impulses P - r and r - previous,
     !> added to `local` and `recent`, and sums. `largest` is raised to the largest |w|^2.
-    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, on_bodies, previous, power, local, recent, sums, largest)
+    pure subroutine tests_kernel(pair, hot, weight, velocity, impulse, on_bodies, previous, power, local, recent, kept, sums, &
+      & largest)
       import :: dp
       implicit none
       integer, intent(in), contiguous :: pair(:, :)
@@ -108,6 +109,8 @@ module gravier_kernel_table
       real(dp), intent(inout), contiguous :: power(:, :)
       !> (nv, n_columns) [N s, N m s]
       real(dp), intent(inout), contiguous :: local(:, :), recent(:, :)
+      !> P - r (lanes, nc, blocks), or of no block where nobody asks for it [N s]
+      real(dp), intent(inout), contiguous :: kept(:, :, :)
       !> the three of a residual; of y . w with the tests P - r, on_bodies and r - previous
       real(dp), intent(out) :: sums(6)
       real(dp), intent(inout) :: largest

@@ -7,7 +7,7 @@ module gravier_cell_response
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: start_response, respond, carry_along, image_velocity, subtract_images
+  public :: start_response, respond, carry_along, image_velocity, subtract_images, virial_of
 
 contains
 
@@ -64,7 +64,13 @@ contains
 
     if (.not. problem%cell%is_driven) return
     do s = 1, size(problem%sub)
-      call sum_virial(problem%sub(s), problem%kernels%nf, parts(:, s))
+      associate (sub => problem%sub(s))
+        parts(:, s) = virial_of(sub, problem%kernels%nf, sub%impulse)
+        if (.not. allocated(sub%attraction)) cycle
+        do k = 1, size(parts, 1)
+          parts(k, s) = parts(k, s) - sum(sub%attraction*sub%cell%lever(:, 1, k, :))
+        end do
+      end associate
     end do
     call problem%comm%sum_parts(parts, virial)
     k = 0
@@ -83,24 +89,26 @@ contains
     end do
   end subroutine respond
 
-  !> Sums of p_a l_b of the contacts of a subdomain [N m s].
-  pure subroutine sum_virial(sub, nf, virial)
+  !> Sums over the contacts of a subdomain of p_a l_b, which are K times the change of the gradient that impulses p make [N m s].
+  pure function virial_of(sub, nf, impulse) result(virial)
     type(subproblem_t), intent(in) :: sub
+    !> components of an impulse that are a force's
     integer, intent(in) :: nf
-    !> (components that stresses drive)
-    real(dp), intent(out) :: virial(:)
+    !> (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: impulse(:, :, :)
+    !> of the components that stresses drive
+    real(dp) :: virial(size(sub%cell%lever, 3))
     integer :: g, k, d
 
     virial(:) = 0.0_dp
-    do g = 1, size(sub%hot, 3)
+    do g = 1, size(impulse, 3)
       do k = 1, size(virial)
         do d = 1, nf
-          virial(k) = virial(k) + sum(sub%impulse(:, d, g)*sub%cell%lever(:, d, k, g))
+          virial(k) = virial(k) + sum(impulse(:, d, g)*sub%cell%lever(:, d, k, g))
         end do
-        if (allocated(sub%attraction)) virial(k) = virial(k) - sum(sub%attraction(:, g)*sub%cell%lever(:, 1, k, g))
       end do
     end do
-  end subroutine sum_virial
+  end function virial_of
 
   !> The shifts of the contacts of a subdomain where contacts have changed the gradients by `change`.
   pure subroutine set_shifts(sub, nf, shift, shift_t, change)

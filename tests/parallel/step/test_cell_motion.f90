@@ -10,6 +10,7 @@ program test_cell_motion
   use gravier_cell_response, only: respond, image_velocity, subtract_images
   use gravier_cell_drive, only: cell_drive_t
   use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_velocity_error, only: velocity_error_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_check, only: check, check_close, finish_checks
@@ -22,6 +23,7 @@ program test_cell_motion
   call check_drive()
   call check_solved_steps()
   call check_returned()
+  call check_error_seen()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -137,6 +139,113 @@ contains
     call check(comm%any_true(apart > closed) .and. comm%any_true(closed > 0), "contacts that part, and some that are closed again")
     call sim%free()
   end subroutine check_returned
+
+  !> A pressure on a square lattice of disks that touch. With nine tenths of the impulses that hold it every disk is in balance, and
+  !> the cell closes with a tenth of the rate g that the pressure gives to it. The velocity error is that of the cell alone, K g^2
+  !> with the inertia K = M L^2, over the mass M of the disks: g L. Test impulses that move no disk show it, because they move the
+  !> cell.
+  subroutine check_error_seen()
+    integer, parameter :: count = 4
+    real(dp), parameter :: h = 0.1_dp, pressure = 5.0_dp
+    type(simulation_t) :: sim
+    type(config_t) :: config
+    type(error_t), allocatable :: error
+    type(step_figures_t) :: figures
+    type(velocity_error_t) :: velocity
+    real(dp) :: rate
+
+    if (comm%rank == 0) call write_square(count)
+    call comm%barrier()
+    call parse_config("square", "&scene bodies = 'file', bodies_file = 'cell_motion.csv', density = 1, gravity = 0, 0, "// &
+      & "period = 4, 4, cell_pressure = 0, 5, cell_inertia = 1 /"//new_line("a")// &
+      & "&time step = 0.1, steps = 1 / &solver method = 'nscdd' / &decomposition grid = 2, 1 /", config, error)
+    if (.not. allocated(error)) call sim%init(comm, config, error)
+    call check(.not. allocated(error), "the square is made")
+    if (allocated(error)) return
+    call sim%assemble(figures)
+    call sim%method%start(sim%problem, error)
+    call check(.not. allocated(error), "the solve starts")
+    call velocity%start(sim%problem, 1.0_dp)
+    rate = h*count**2*pressure/sim%problem%cell%inertia(2, 2)
+    call check_close(sim%problem%cell%free(2, 2), -rate, 1.0e-12_dp, "the rate that the pressure gives")
+    call check_error(sim, velocity, h*pressure, 0.9_dp, 0.1_dp*rate, "nine tenths of the impulses")
+    ! without impulses violations alone show it
+    call check_error(sim, velocity, h*pressure, 0.0_dp, rate, "no impulses")
+    call check_change(sim, velocity, count, h*pressure)
+    call sim%free()
+  end subroutine check_error_seen
+
+  !> Contacts above the row k of disks, 0 to count - 1, had the exact impulses, and have k a more. What has changed makes the whole
+  !> error: a disk moves with a/m, those of the first row with (count - 1) a/m, and the cell with the virial of the change over K. No
+  !> other test impulse has the same velocity.
+  subroutine check_change(sim, velocity, count, held)
+    type(simulation_t), intent(inout) :: sim
+    type(velocity_error_t), intent(inout) :: velocity
+    integer, intent(in) :: count
+    real(dp), intent(in) :: held
+    real(dp) :: residual, defect, a, mass, virial, square
+    integer :: s, c, row(2)
+
+    a = 0.1_dp*held
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        sim%method%acceleration%part(s)%impulse = sub%impulse
+        do c = 1, sub%n_contacts
+          if (abs(sub%hot(lane_of(c), 2, block_of(c))) < 0.5_dp) cycle
+          row(1) = int(sub%id(sub%pair(1, c)) - 1)/count
+          row(2) = int(sub%id(sub%pair(2, c)) - 1)/count
+          if (abs(row(1) - row(2)) > 1) row(:) = count - 1
+          sim%method%acceleration%part(s)%impulse(lane_of(c), 1, block_of(c)) = held
+          sub%impulse(lane_of(c), 1, block_of(c)) = held + minval(row)*a
+        end do
+      end associate
+    end do
+    call respond(sim%problem)
+    call sim%problem%evaluate()
+    call velocity%assess(sim%problem, sim%method, 1, residual, defect)
+    mass = velocity%mass/count**2
+    virial = count*(count*(count - 1)/2)*a
+    square = count*(count - 1)*count*a**2/mass + virial**2/sim%problem%cell%inertia(2, 2)
+    call check_close(velocity%projection, sqrt(square/velocity%mass), 1.0e-9_dp, "Y of a change that moves disks and cell")
+  end subroutine check_change
+
+  !> A bodies file of disks of diameter 1, `count` by `count` in a square.
+  subroutine write_square(count)
+    integer, intent(in) :: count
+    integer :: unit, i, j
+
+    open (newunit=unit, file="cell_motion.csv", action="write", status="replace")
+    write (unit, "(a)") "id,x,y,radius"
+    do j = 1, count
+      do i = 1, count
+        write (unit, "(i0, ',', f5.2, ',', f5.2, ',0.5')") i + (j - 1)*count, i - 0.5_dp, j - 0.5_dp
+      end do
+    end do
+    close (unit)
+  end subroutine write_square
+
+  !> What is found where contacts along y have a share of the impulses `held` each, and the cell closes with the rate `left`.
+  subroutine check_error(sim, velocity, held, share, left, name)
+    type(simulation_t), intent(inout) :: sim
+    type(velocity_error_t), intent(inout) :: velocity
+    real(dp), intent(in) :: held, share, left
+    character(len=*), intent(in) :: name
+    real(dp) :: residual, defect
+    integer :: s, c
+
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do c = 1, sub%n_contacts
+          if (abs(sub%hot(lane_of(c), 2, block_of(c))) > 0.5_dp) sub%impulse(lane_of(c), 1, block_of(c)) = share*held
+        end do
+      end associate
+    end do
+    call respond(sim%problem)
+    call sim%problem%evaluate()
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
+    call check_close(velocity%largest_violation, left, 1.0e-12_dp, name//": rate at which disks close")
+    call check_close(velocity%projection, left*sim%decomposition%period%length(2), 1.0e-12_dp, name//": Y of the cell")
+  end subroutine check_error
 
   !> K (now - before) = sum of p l - h V s, and contacts that press do not part or close, relative to the images that they meet.
   subroutine check_step(sim)

@@ -139,7 +139,7 @@ contains
   !> a_t r_t at its rim; the residual and the tests of the velocity error are 0 there. Blocks do what single contacts do.
   subroutine test_law()
     type(case_t) :: problem, singles
-    real(dp), allocatable :: v(:, :, :), previous(:, :, :), power(:, :), local(:, :), recent(:, :)
+    real(dp), allocatable :: v(:, :, :), previous(:, :, :), kept(:, :, :), power(:, :), local(:, :), recent(:, :)
     real(dp) :: sums(2), found(3), tests(6), largest, bound, slip(dimension - 1)
     integer :: sweep, c
 
@@ -153,6 +153,7 @@ contains
     end do
     associate (kernels => problem%kernels, row => problem%kernels%row)
       allocate (v, previous, mold=problem%impulse)
+      allocate (kept(lanes, dimension, 0))
       allocate (power(lanes, n_blocks(n)))
       allocate (local, recent, mold=problem%velocity)
       call kernels%residual(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, found)
@@ -162,7 +163,7 @@ contains
       recent(:, :) = 0.0_dp
       largest = 0.0_dp
       call kernels%make_tests(problem%pair, problem%hot, problem%weight, problem%velocity, problem%impulse, problem%impulse, &
-        & previous, power, local, recent, tests, largest)
+        & previous, power, local, recent, kept, tests, largest)
       call check_close(sqrt(largest), 0.0_dp, 100*rounding, "violation at the solution")
       call kernels%contact_velocity(problem%pair, problem%hot, problem%velocity, v)
       do c = 1, n
