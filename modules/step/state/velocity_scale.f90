@@ -308,11 +308,11 @@ contains
       associate (sub => problem%sub(s))
         if (allocated(sub%concern)) deallocate (sub%concern)
         if (self%kind /= of_motion .and. self%kind /= of_bonds) cycle
-        allocate (sub%concern(sub%n_bodies), source=1.0_dp)
         do b = 1, sub%n_grains
           call find_own_velocity(sub, physics, b, v)
           own = max(least, self%share*norm2(v - frame(1:size(v))))
           if (own >= limit) cycle
+          if (.not. allocated(sub%concern)) allocate (sub%concern(sub%n_bodies), source=1.0_dp)
           sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
         end do
       end associate

@@ -176,8 +176,8 @@ contains
   end subroutine check_error_seen
 
   !> Contacts above the row k of disks, 0 to count - 1, had the exact impulses, and have k a more. What has changed makes the whole
-  !> error: a disk moves with a/m, those of the first row with (count - 1) a/m, and the cell with the virial of the change over K. No
-  !> other test impulse has the same velocity.
+  !> error: a disk moves with a/m, those of the first row with (count - 1) a/m, and the cell with the virial of the change over K.
+  !> No other test impulse has the same velocity.
   subroutine check_change(sim, velocity, count, held)
     type(simulation_t), intent(inout) :: sim
     type(velocity_error_t), intent(inout) :: velocity
