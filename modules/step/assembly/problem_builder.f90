@@ -215,10 +215,11 @@ contains
 
   !> Scales of the residual, of the jump and of roundings: largest |R^d|, over the components that can move, largest free speed,
   !> and largest term of R^d of a body in contact. What moves as prescribed counts with the mass of the heaviest grain that it may
-  !> strike; a spring that is compressed, with the impulse that it gives where nothing moves. Collective.
+  !> strike; a body that is no disk or sphere, with the speed of its farthest point; a spring that is compressed, with the impulse
+  !> that it gives where nothing moves. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(3), moving(problem%kernels%nd), speed, lightest, inverse
+    real(dp) :: scales(3), moving(problem%kernels%nd), rim, speed, lightest, inverse
     integer :: s, b, c, d, nd
 
     nd = problem%kernels%nd
@@ -227,14 +228,16 @@ contains
       associate (sub => problem%sub(s))
         lightest = huge(1.0_dp)
         do b = 1, sub%n_bodies
-          scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)))
+          rim = 0.0_dp
+          if (problem%kernels%row%arm_i > 0 .and. b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
+          scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)) + rim)
           moving(:) = sub%v_free(1:nd, b)
           do d = 1, nd
             if (.not. sub%moves(d, b)) moving(d) = 0.0_dp
           end do
           inverse = inverse_of_translation(sub%inverse_mass(:, b), nd)
           if (.not. inverse > 0.0_dp) cycle
-          scales(1) = max(scales(1), norm2(moving)/inverse)
+          scales(1) = max(scales(1), (norm2(moving) + rim)/inverse)
           lightest = min(lightest, inverse)
         end do
         do b = sub%n_bodies + 1, sub%n_columns

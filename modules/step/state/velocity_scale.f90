@@ -9,7 +9,8 @@
 !>            add to velocities
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
-!>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms
+!>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
+!>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
 !>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
@@ -21,6 +22,7 @@ module gravier_velocity_scale
   use gravier_periodic, only: gradient_times
   use gravier_communicator, only: communicator_t
   use gravier_motion, only: grain_volume
+  use gravier_body_mass, only: mass_product
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
@@ -198,7 +200,7 @@ contains
     do s = 1, size(problem%sub)
       if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
       if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
-      call add_grains(problem%sub(s), physics, motion%common, parts(5:, s))
+      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(5:, s))
       call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(5:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
@@ -247,11 +249,13 @@ contains
   !> Mass, twice the energy and momentum of the grains at the start of the step. Loads of the step are taken out of the
   !> velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains share counts
   !> in equal parts.
-  pure subroutine add_grains(sub, physics, frame, sums)
+  pure subroutine add_grains(sub, physics, frame, shaped, sums)
     type(subproblem_t), intent(in) :: sub
     type(physics_t), intent(in) :: physics
     !> velocity of the observer [m/s]
     real(dp), intent(in) :: frame(3)
+    !> there are bodies that are no disks or spheres
+    logical, intent(in) :: shaped
     !> (2 + nd)
     real(dp), intent(inout) :: sums(:)
     real(dp) :: v(3), m
@@ -264,9 +268,21 @@ contains
       m = 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
       sums(1) = sums(1) + m
       sums(2) = sums(2) + m*sum(v(1:nd)**2)
+      if (shaped) sums(2) = sums(2) + m*square_of_spin(sub, b, nd)
       sums(3:) = sums(3:) + m*v(1:nd)
     end do
   end subroutine add_grains
+
+  !> The square of the velocity that has the energy of the spin of a grain [m^2/s^2].
+  pure real(dp) function square_of_spin(sub, b, nd) result(square)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: b, nd
+    real(dp) :: spin(size(sub%v_free, 1))
+
+    spin(:) = sub%v_free(:, b)
+    spin(1:nd) = 0.0_dp
+    square = sub%inverse_mass(1, b)*mass_product(sub%inverse_mass(:, b), spin, spin)
+  end function square_of_spin
 
   !> The velocity of a grain at the start of the step, beside that of a cell that deforms.
   pure subroutine find_own_velocity(sub, physics, b, v)
@@ -310,7 +326,9 @@ contains
         if (self%kind /= of_motion .and. self%kind /= of_bonds) cycle
         do b = 1, sub%n_grains
           call find_own_velocity(sub, physics, b, v)
-          own = max(least, self%share*norm2(v - frame(1:size(v))))
+          own = norm2(v - frame(1:size(v)))
+          if (problem%kernels%row%arm_i > 0) own = hypot(own, sqrt(square_of_spin(sub, b, size(v))))
+          own = max(least, self%share*own)
           if (own >= limit) cycle
           if (.not. allocated(sub%concern)) allocate (sub%concern(sub%n_bodies), source=1.0_dp)
           sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
