@@ -72,7 +72,9 @@ contains
     call move_alloc(key, self%key)
   end subroutine lengthen
 
-  !> Of points that are one, where pieces of a cluster meet, keep the deepest, of several the first.
+  !> Of points that are one, where pieces of a cluster meet, keep the deepest, of several the first. Where bodies overlap, the point
+  !> of a corner lies half of the overlap away from it, in a direction that differs between pieces by their tilt: points that are
+  !> nearer to each other than the overlap are one, too, so that their number does not depend on the tilt.
   pure subroutine pair_points_merge_near(points, near)
     class(pair_points_t), intent(inout) :: points
     !> points of two pairs of pieces nearer to each other than this, with the same normal, are one [m]
@@ -87,7 +89,7 @@ contains
       do l = k + 1, points%n
         if (points%key(2, k) == points%key(2, l)) cycle
         if (dropped(k) .or. dropped(l)) cycle
-        if (maxval(abs(points%point(:, k) - points%point(:, l))) > near) cycle
+        if (maxval(abs(points%point(:, k) - points%point(:, l))) > max(near, -points%gap(k), -points%gap(l))) cycle
         if (maxval(abs(points%normal(:, k) - points%normal(:, l))) > same) cycle
         dropped(l) = points%gap(l) >= points%gap(k)
         dropped(k) = .not. dropped(l)
