@@ -8,6 +8,7 @@ module gravier_step_figures
   use gravier_decomposition, only: decomposition_t
   use gravier_interface, only: interface_statistics_t
   use gravier_given_impulses, only: started_t
+  use gravier_deep_contacts, only: deep_contacts_t
   use gravier_cell_drive, only: check_cell_size
   use gravier_diagnostics, only: diagnostics_t
   implicit none
@@ -19,8 +20,10 @@ module gravier_step_figures
     type(solve_report_t) :: solve
     type(interface_statistics_t) :: interface_statistics
     integer(i8) :: contacts = 0
-    !> grains that left by an outlet; grains that move by more than their radius in a step
+    !> grains that left by an outlet; grains that move by more than half of their thickness, a ball by its radius, in a step
     integer(i8) :: left = 0, fast = 0
+    !> where bodies have shapes, contacts that are pressed deep for the thinner body
+    type(deep_contacts_t) :: deep
     !> grains that have entered, and their mass [kg]
     integer(i8) :: entered = 0
     real(dp) :: entered_mass = 0.0_dp

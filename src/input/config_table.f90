@@ -127,7 +127,7 @@ module gravier_config_table
      key_t("scene", "overlap_projection", kind_logical, ".true.", "", "remove overlaps by moving grains and free boundaries"), &
      key_t("scene", "start_overlap", kind_real, "0.5", ">= 0", &
            "largest overlap at the start, as a fraction of the smaller radius of two grains, or of the radius of a grain at a "// &
-           "boundary")]
+           "boundary; of a body with a shape half of its least thickness counts")]
 
   type(key_t), parameter :: shape_keys(*) = &
     [key_t("boundary", "name", kind_text, "''", "not empty", &

@@ -72,10 +72,10 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    associate (tally => simulation%tally, radius => simulation%decomposition%rule%mean_radius)
+    associate (tally => simulation%tally, size => simulation%mean_half_thickness)
       text = "overlaps    in the first step at most "//to_text(tally%start_overlap, 3)//" m, later at most "// &
         & to_text(tally%later_overlap, 3)//" m"
-      if (radius > 0.0_dp) text = text//", "//to_text(tally%later_overlap/radius, 2)//" of the mean radius"
+      if (size > 0.0_dp) text = text//", "//to_text(tally%later_overlap/size, 2)//" of "//mean_size_name(simulation)
       if (simulation%physics%laws%yields) text = text//", of rigid contacts"
       text = text//newline
       if (simulation%physics%laws%yields) text = text//spring_line(simulation)
@@ -101,12 +101,21 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    associate (tally => simulation%tally, radius => simulation%decomposition%rule%mean_radius)
+    associate (tally => simulation%tally, size => simulation%mean_half_thickness)
       text = indent//"compliant contacts are deformed by at most "//to_text(tally%deformation, 3)//" m"
-      if (radius > 0.0_dp) text = text//", "//to_text(tally%deformation/radius, 2)//" of the mean radius"
+      if (size > 0.0_dp) text = text//", "//to_text(tally%deformation/size, 2)//" of "//mean_size_name(simulation)
       text = text//"; h sqrt(k/m) at most "//to_text(tally%stiffest, 3)//newline
     end associate
   end function spring_line
+
+  !> What overlaps are compared with.
+  function mean_size_name(simulation) result(name)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: name
+
+    name = "the mean radius"
+    if (simulation%effects%shapes) name = "half of the mean thickness"
+  end function mean_size_name
 
   !> A fraction as people write it; what is not 0 is not written as 0.
   pure function percent(share) result(text)

@@ -3,7 +3,7 @@ module gravier_run_log
   use, intrinsic :: iso_fortran_env, only: output_unit
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text, times_text, growing_text_t
+  use gravier_text, only: to_text, counted, times_text, growing_text_t
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: n_phases
   use gravier_file_system, only: terminal_width
@@ -14,9 +14,9 @@ module gravier_run_log
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory
   use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
-    & warn_relaxation, warn_partition, warn_springs, note_balance, note_scale
+    & warn_relaxation, warn_partition, warn_springs, warn_deep, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
-  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
+  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning, fast_warning
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_region_lines, only: region_warnings
   use gravier_run_tally, only: relative_error
@@ -397,8 +397,12 @@ contains
       & balance_text(figures%rank_balance, figures%subdomain_balance)//", until this partition", error)
     if (figures%refused) call warn(self, warn_partition, 1_i8, "warning     the grains fill fewer cells than there are "// &
       & "subdomains, and the old partition is kept", error)
-    if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "//to_text(figures%fast)// &
-      & " grains move by more than their radius in step "//to_text(simulation%step), error)
+    if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "// &
+      & fast_warning(simulation, figures%fast, simulation%step), error)
+    if (figures%deep%number > 0) call warn(self, warn_deep, figures%deep%number, "warning     "// &
+      & counted(figures%deep%number, "contact")// &
+      & " overlap by a quarter of a thickness and more in step "//to_text(simulation%step)//", at most by "// &
+      & to_text(0.5_dp*figures%deep%deepest, 2)//" of it: thin bodies may come out on the other side", error)
     if (simulation%tally%stiffest > 2.0_dp*self%told_stiffest) then
       self%told_stiffest = simulation%tally%stiffest
       call warn(self, warn_springs, 1_i8, "warning     "//spring_warning(simulation), error)

@@ -208,10 +208,11 @@ contains
     end associate
   end function may_loosen
 
-  !> Whether overlaps have grown beyond what is allowed; where they are not projected, beyond a hundredth of the mean radius.
+  !> Whether overlaps have grown beyond what is allowed; where they are not projected, beyond a hundredth of the mean radius,
+  !> or of half of the mean thickness.
   logical function overlaps_grew(simulation) result(grew)
     type(simulation_t), intent(in) :: simulation
-    grew = simulation%tally%overlaps_grew(merge(simulation%overlap_allowed, 0.01_dp*simulation%decomposition%rule%mean_radius, &
+    grew = simulation%tally%overlaps_grew(merge(simulation%overlap_allowed, 0.01_dp*simulation%mean_half_thickness, &
       & simulation%overlap_allowed < huge(1.0_dp)))
   end function overlaps_grew
 

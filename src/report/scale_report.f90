@@ -1,13 +1,13 @@
 !> What the scales of a scene say to a person: lines of --check, and warnings where the step or the tolerance cannot hold what the
 !> scene is for.
 module gravier_scale_report
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
   implicit none
   private
-  public :: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning
+  public :: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning, fast_warning
 
   character(len=*), parameter :: newline = new_line("a")
   !> digits of a figure
@@ -74,21 +74,30 @@ contains
     integer, intent(out) :: number
     !> velocity error that solves may leave to the mean grain [m/s]
     real(dp) :: error
-    real(dp) :: g, a, most
+    real(dp) :: g, a, most, half
+    character(len=:), allocatable :: halves, least
 
     text = ""
     number = 0
     if (.not. scales%diameter > 0.0_dp) return
     associate (h => simulation%config%time%step, solver => simulation%config%solver, d => scales%diameter)
+      half = 0.5_dp*d
+      halves = " mean radii"
+      least = " radii of the smallest grain"
+      if (simulation%effects%shapes) then
+        half = simulation%mean_half_thickness
+        halves = " times half of the mean thickness"
+        least = " times half of the thickness of the thinnest grain"
+      end if
       g = norm2(scales%acceleration)
       if (g*h**2 > most_by_gravity*d) call warn_step("loads move a free grain by "//figure(g*h**2/d)// &
         & " mean diameters in it", sqrt(most_by_gravity*d/g))
-      if (h*sqrt(2.0_dp*g*scales%fall) > most_by_fall*0.5_dp*d) call warn_step("a grain that falls "//figure(scales%fall)// &
-        & " m to the lowest support moves by "//figure(2.0_dp*h*sqrt(2.0_dp*g*scales%fall)/d)// &
-        & " mean radii in it and may pass through others", most_by_fall*0.5_dp*d/sqrt(2.0_dp*g*scales%fall))
+      if (h*sqrt(2.0_dp*g*scales%fall) > most_by_fall*half) call warn_step("a grain that falls "//figure(scales%fall)// &
+        & " m to the lowest support moves by "//figure(h*sqrt(2.0_dp*g*scales%fall)/half)// &
+        & halves//" in it and may pass through others", most_by_fall*half/sqrt(2.0_dp*g*scales%fall))
       if (scales%speed*h > most_by_boundary*scales%smallest .and. scales%smallest > 0.0_dp) call warn_step("boundary '"// &
         & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
-        & " radii of the smallest grain in it", most_by_boundary*scales%smallest/scales%speed)
+        & least//" in it", most_by_boundary*scales%smallest/scales%speed)
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
@@ -127,6 +136,18 @@ contains
     end subroutine warn
 
   end subroutine scale_warnings
+
+  !> That grains move too far in a step.
+  function fast_warning(simulation, fast, step) result(text)
+    type(simulation_t), intent(in) :: simulation
+    !> how many
+    integer(i8), intent(in) :: fast
+    integer, intent(in) :: step
+    character(len=:), allocatable :: text
+
+    text = to_text(fast)//" grains move by more than "// &
+      & trim(merge("half of their thickness", "their radius           ", simulation%effects%shapes))//" in step "//to_text(step)
+  end function fast_warning
 
   !> That the step does not resolve the collisions of the stiffest compliant contacts.
   function spring_warning(simulation) result(text)

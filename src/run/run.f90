@@ -8,6 +8,7 @@ module gravier_run
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
   use gravier_simulation, only: simulation_t, step_figures_t
+  use gravier_scale_report, only: fast_warning
   use gravier_scene_scales, only: scene_scales_t
   use gravier_start_overlap, only: check_start_overlap
   use gravier_memory_report, only: peak_memory
@@ -70,6 +71,10 @@ contains
     call log%write_started(figures, error)
     call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
     call log%write_scales(simulation, scales, .true., warnings, error)
+    if (figures%fast > 0) then
+      call log%line("warning     "//fast_warning(simulation, figures%fast, 1), error)
+      warnings = warnings + 1
+    end if
     call log%write_memory(simulation, libraries, error)
     select case (warnings)
     case (0)

@@ -18,6 +18,7 @@ module gravier_simulation
   use gravier_step_figures, only: step_figures_t
   use gravier_time_stepper, only: time_stepper_t
   use gravier_config_types, only: config_t
+  use gravier_scene_thickness, only: mean_half_thickness
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
   use gravier_scene_cell, only: make_cell_drive
@@ -38,6 +39,8 @@ module gravier_simulation
   real(dp), parameter :: most_travel = 0.5_dp
 
   type, extends(time_stepper_t) :: simulation_t
+    !> of the grains as the run begins; of disks and spheres the mean radius [m]
+    real(dp) :: mean_half_thickness = 0.0_dp
     type(config_t) :: config
     !> boundaries that came with the grains: the first ones
     integer :: n_walls = 0
@@ -230,6 +233,7 @@ contains
         & self%sleeping%after > 0, scene%effects%shapes .or. has_facets(scene%boundaries))
       rule%largest_radius = scene%largest_radius
       rule%mean_radius = scene%mean_radius
+      self%mean_half_thickness = mean_half_thickness(self%comm, scene)
       rule%alert_distance = merge(config%alert_distance, 0.1_dp*scene%largest_radius, config%alert_distance_given)
       rule%alert_distance = max(rule%alert_distance, scene%laws%range)
       rule%filter = scene%laws%filter

@@ -19,7 +19,7 @@ module gravier_scene_scales
 
   !> The same on all ranks. What a scene does not have is 0.
   type :: scene_scales_t
-    !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius of the grains that are not glued [m]
+    !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius, or half thickness, of the grains that are not glued [m]
     real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
     !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
     real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
@@ -92,7 +92,7 @@ contains
     a = h*sqrt(self%pressure/self%density)/self%diameter
   end function scene_scales_relative_step
 
-  !> Places of the grains and the smallest radius, in one pass. Collective.
+  !> Places of the grains and the smallest radius, of bodies with shapes half of the least thickness, in one pass. Collective.
   subroutine find_extent(simulation, extent, smallest)
     type(simulation_t), intent(in) :: simulation
     type(extent_t), intent(out) :: extent
@@ -119,7 +119,7 @@ contains
           parts(1, s) = parts(1, s) + simulation%decomposition%figures%volume_of(owned, k)
           far(1:nd) = max(far(1:nd), owned%radius(k) - owned%position(:, k))
           far(4:3 + nd) = max(far(4:3 + nd), owned%radius(k) + owned%position(:, k))
-          far(7) = max(far(7), -owned%radius(k))
+          far(7) = max(far(7), -simulation%decomposition%figures%half_thickness_of(owned, k))
         end do
       end associate
     end do

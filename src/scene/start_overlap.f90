@@ -15,7 +15,8 @@ module gravier_start_overlap
   !> fraction of a radius that roundings of the places take
   real(dp), parameter :: rounding = 1.0e-6_dp
 
-  !> An overlap as a fraction of the smaller radius, or of the radius of a grain in a boundary.
+  !> An overlap as a fraction of the smaller radius, or of the radius of a grain in a boundary; of a body with a shape half of its
+  !> thickness stands for the radius.
   type :: overlap_t
     real(dp) :: share = 0.0_dp
     !> identifiers; the second is 0 in a boundary
@@ -104,8 +105,8 @@ contains
         end if
         call work%init(decomposition%nd)
         call find_points(view, decomposition, p, work, points)
-        smaller = bodies%radius(i)
-        if (j > 0) smaller = min(smaller, bodies%radius(j))
+        smaller = decomposition%figures%half_thickness_of(bodies, i)
+        if (j > 0) smaller = min(smaller, decomposition%figures%half_thickness_of(bodies, j))
         if (points%n > 0) overlap%share = -minval(points%gap(1:points%n))/smaller
         overlap%boundary = -j
         if (j < 0) return
@@ -142,11 +143,13 @@ contains
       glued = ""
       if (worst%boundary > 0) glued = "boundary '"//simulation%decomposition%boundaries(worst%boundary)%name//"'"
       if (worst%id(2) == 0) then
-        text = text//"body "//to_text(worst%id(1))//" overlaps "//glued//" by "//percent(worst%share)//" of its radius"
+        text = text//"body "//to_text(worst%id(1))//" overlaps "//glued//" by "//percent(worst%share)//" of "// &
+          & trim(merge("half of its thickness", "its radius           ", simulation%effects%shapes))
       else
         text = text//"bodies "//to_text(worst%id(1))//" and "//to_text(worst%id(2))
         if (glued /= "") text = text//" (glued to "//glued//")"
-        text = text//" overlap by "//percent(worst%share)//" of the smaller radius"
+        text = text//" overlap by "//percent(worst%share)//" of "// &
+          & trim(merge("half of the smaller thickness", "the smaller radius           ", simulation%effects%shapes))
       end if
       text = text//" at the start"
       if (number > 1) text = text//", the most of "//to_text(number)//" pairs"

@@ -306,6 +306,41 @@ class Shapes(RunTestCase):
             self.assert_status(run, 0)
             np.testing.assert_allclose(run.history()["kinetic_energy"], 0.5 * 2500.0 * 0.006 * 8.0 * moment * 4.0 / 12.0, rtol=1e-9)
 
+    def test_thin_bodies(self):
+        """Slabs and planks that are too fast for their thickness are counted and warned of, as is a slab that a spring lets through."""
+        head = "id,x,y,z,shape,vz,radius\n1,0,0,0,slab,0,\n2,0,0,0.11,slab,"
+        flat = "id,x,y,shape,vy,radius\n1,0,0,slab,0,\n2,0,0.05,slab,-3,\n"
+        solid = {"scene": {"dimension": 3, "friction": 0.0, "gravity": [0, 0, 0]}}
+        spring = {"scene": {"friction": 0.0, "gravity": [0, 0]}, "material": [{"name": "m"}],
+                  "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e5}]}
+        fast, deep = "1 grains move by more than half of their thickness in step 1", "overlap by a quarter of a thickness and more"
+        for name, shape, bodies, more, steps, words in (
+                ("slab", "box 1 1 0.01", head + "-15,\n", merged(solid, {"scene": {"restitution": 0.5}}), (1e-3, 20), (fast, deep)),
+                ("plank", "box 0.12 0.024 0.008", head + "-4,\n", solid, (5e-3, 15), (fast, deep)),
+                ("slow plank", "box 0.12 0.024 0.008", head + "-0.7,\n", solid, (5e-3, 15), ()),
+                ("spring", "polygon -0.5 -0.005  0.5 -0.005  0.5 0.005  -0.5 0.005", flat, spring, (1e-4, 600), (deep,))):
+            with self.subTest(name):
+                directory = self.prepare(f"thin {name}", f"shape slab\n{shape}\n", bodies)
+                case = merged(merged(CASE, more), {"time": {"step": steps[0], "steps": steps[1]}})
+                run = run_case(case, 1, directory)
+                self.assert_status(run, 0)
+                self.assertEqual(run.history()["fast"].tolist(), [float(fast in words)] * steps[1])
+                for word in (fast, deep):
+                    self.assertEqual(word in run.stdout, word in words, word)
+                check = gravier("--check", "case.nml", directory=directory)
+                self.assertEqual(fast in check.stdout, fast in words)
+
+    def test_thin_start(self):
+        """What overlaps by more than half of the half thickness of a slab is refused."""
+        bodies = "id,x,y,shape\n1,0,0,slab\n2,0,0.0{},slab\n"
+        for height, status in (("08", 0), ("07", 2)):
+            directory = self.prepare(f"thin start {height}", "shape slab\npolygon -0.5 -0.005  0.5 -0.005  0.5 0.005  -0.5 0.005\n",
+                                     bodies.format(height))
+            run = run_case(CASE, 1, directory)
+            self.assert_status(run, status)
+            if status == 2:
+                self.assertIn("bodies 1 and 2 overlap by 60.0 % of half of the smaller thickness", run.stderr)
+
     def test_restart_of_another_library(self):
         """A library that changed in one number is another scene; one that is written in another way is the same."""
         case = merged(CASE, {"time": {"steps": 1}, "output": {"checkpoint_every": 1}})

@@ -2,6 +2,7 @@
 module gravier_shape_library
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
+  use gravier_piece_width, only: half_width_of
   implicit none
   private
   public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, of_face
@@ -21,6 +22,8 @@ module gravier_shape_library
     type(convex_piece_t), allocatable :: piece(:)
     !> volume (area in 2D)
     real(dp) :: volume = 0.0_dp
+    !> half of the least width of its thinnest piece; found when a library takes the shape
+    real(dp) :: half_thickness = 1.0_dp
     !> principal moments of inertia of a body of mass 1, in 2D the first alone
     real(dp) :: inertia(3) = 0.0_dp
     !> radius of that ball in the length unit of the file that the shape comes from
@@ -69,6 +72,11 @@ contains
     end if
     self%n = self%n + 1
     self%shape(self%n) = shape
+    do k = 1, size(shape%piece)
+      associate (least => self%shape(self%n)%half_thickness)
+        least = min(least, half_width_of(shape%piece(k)))
+      end associate
+    end do
     call lengthen(self%counts%pieces, size(shape%piece))
     call lengthen(self%counts%points, of_vertex)
     do k = 1, size(shape%piece)

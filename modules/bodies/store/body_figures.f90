@@ -1,4 +1,4 @@
-!> Volume, inertia and free rotation of bodies, whatever their shapes.
+!> Volume, thickness, inertia and free rotation of bodies, whatever their shapes.
 module gravier_body_figures
   use gravier_kinds, only: dp
   use gravier_motion, only: grain_volume, free_spin, inertia_in_global_axes, spin_energy
@@ -13,11 +13,14 @@ module gravier_body_figures
     private
     !> volume of a body of radius 1 (shapes)
     real(dp), allocatable :: volume(:)
+    !> half of the least width of a body of radius 1 (shapes)
+    real(dp), allocatable :: half_thickness(:)
     !> principal moments of inertia over the largest (3, shapes)
     real(dp), allocatable :: principal(:, :)
   contains
     procedure :: init => body_figures_init
     procedure :: volume_of => body_figures_volume_of
+    procedure :: half_thickness_of => body_figures_half_thickness_of
     procedure :: add_rotation => body_figures_add_rotation
     procedure :: find_inverse_inertia => body_figures_find_inverse_inertia
     procedure :: turn_freely => body_figures_turn_freely
@@ -30,11 +33,12 @@ contains
     type(shape_library_t), intent(in) :: shapes
     integer :: k
 
-    if (allocated(self%volume)) deallocate (self%volume, self%principal)
+    if (allocated(self%volume)) deallocate (self%volume, self%half_thickness, self%principal)
     if (shapes%n == 0) return
-    allocate (self%volume(shapes%n), self%principal(3, shapes%n))
+    allocate (self%volume(shapes%n), self%half_thickness(shapes%n), self%principal(3, shapes%n))
     do k = 1, shapes%n
       self%volume(k) = shapes%shape(k)%volume
+      self%half_thickness(k) = shapes%shape(k)%half_thickness
       self%principal(:, k) = shapes%shape(k)%inertia/maxval(shapes%shape(k)%inertia)
     end do
   end subroutine body_figures_init
@@ -53,6 +57,17 @@ contains
     end if
     volume = grain_volume(bodies%nd, bodies%radius(k))
   end function body_figures_volume_of
+
+  !> Half of the thickness of body `k` where it is thinnest, the radius of a disk or a sphere [m].
+  pure real(dp) function body_figures_half_thickness_of(self, bodies, k) result(half)
+    class(body_figures_t), intent(in) :: self
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+
+    half = bodies%radius(k)
+    if (bodies%no == 0) return
+    if (bodies%shape(k) > 0) half = self%half_thickness(bodies%shape(k))*half
+  end function body_figures_half_thickness_of
 
   !> Add the energy that body `k` has at a spin [J]; none where bodies do not turn.
   pure subroutine body_figures_add_rotation(self, bodies, k, velocity, energy)

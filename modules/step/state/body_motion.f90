@@ -101,8 +101,8 @@ contains
     end do
   end subroutine drive
 
-  !> Count the grains that move by more than their radius in a step, beside a cell that moves: they may pass through others unseen.
-  !> Collective.
+  !> Count the grains that move by more than half of their thickness in a step, a ball by more than its radius, beside a cell that
+  !> moves: they may pass through others unseen. Collective.
   integer(i8) function count_fast(decomposition, physics) result(fast)
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -124,7 +124,7 @@ contains
             carried(:) = gradient_times(gradient, place)
             v(:) = v - carried
           end if
-          if (physics%h**2*sum(v**2) > owned%radius(k)**2) counts(1) = counts(1) + 1
+          if (physics%h**2*sum(v**2) > decomposition%figures%half_thickness_of(owned, k)**2) counts(1) = counts(1) + 1
         end do
       end associate
     end do
