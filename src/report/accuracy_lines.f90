@@ -115,6 +115,7 @@ contains
 
     name = "the mean radius"
     if (simulation%effects%shapes) name = "half of the mean thickness"
+    if (simulation%inflow%exists()) name = name//", the smallest of the start and of what enters"
   end function mean_size_name
 
   !> A fraction as people write it; what is not 0 is not written as 0.

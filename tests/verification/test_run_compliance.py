@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from gravier_runs import LONG, each, merged, run_case, write
+from shaped_scenes import body, prepare, shaped_case
 from small_scenes import EPS, G, Grain, SmallScene, plane
 
 RADIUS, MASS, STIFFNESS = 0.05, 0.7, 7000.0
@@ -391,6 +392,23 @@ class RigidLimit(ComplianceScene):
             self.assertTrue(np.all(np.abs(order - 1) < 0.05), (friction, pull, found))
             self.verify("column of six as stiffness grows", f"distance of the velocities from the rigid ones [m/s], friction {friction}",
                         found[-1], 0, 1e-4)
+
+
+    def test_seam(self):
+        """Two squares side by side are one body with three points on a plane, whatever its tilt: the corners at the seam are one point. The body
+        sinks by m g/3k; it sank by a quarter less when it leaned by more than 1e-5 rad."""
+        library = "shape two\npolygon -0.1 -0.05  0 -0.05  0 0.05  -0.1 0.05\npolygon 0 -0.05  0.1 -0.05  0.1 0.05  0 0.05\n"
+        ground = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+        for pull in (0.0, 1e-4, 1e-2):
+            directory = prepare(self.here(f"seam {pull}"), 2, [body("two", [0.0, 0.05])], library)
+            run = run_case(shaped_case(2, [ground], {
+                "scene": {"density": 2500.0, "gravity": [pull, -G], "wall_material": "m"}, "material": MATERIAL,
+                "law": [elastic(normal_stiffness=1e5, friction=0.5, spring_restitution=0.2, tangential_damping=1.0)],
+                "time": {"steps": 1500}, "output": {"every": 1500}}), directory=directory)
+            self.assert_status(run, 0)
+            found = run.results()
+            self.assertEqual(len(found["/steps/1500/contacts/gap"]), 3)
+            self.assertAlmostEqual(found["/steps/1500/bodies/position"][0, 1], 0.05 - 50.0 * G / 3e5, delta=1e-8)
 
 
 class Invariance(ComplianceScene):
