@@ -12,6 +12,7 @@ program test_step_parts
   use gravier_contact_structure, only: contact_structure_t, bin_width, n_bins
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
+  use gravier_deep_contacts, only: deep_contacts_t
   use gravier_sleeping, only: count_rest
   use gravier_borne_impulses, only: find_seen
   use gravier_waking, only: resting_t, watch_awake, wake_all
@@ -72,6 +73,7 @@ program test_step_parts
   call check_held()
   call check_left_behind()
   call check_starting_boundary()
+  call check_deep_contacts()
   call check_projection()
   call check_projected_row()
   call check_shared_lid()
@@ -1035,6 +1037,27 @@ contains
     call check_close(grain(sim, 1, 3), 0.2_dp, solved, "and roll: R w = 2 v against the plane")
     call sim%free()
   end subroutine check_starting_boundary
+
+  !> Two disks that overlap by 0.6 of a radius, two that overlap by 0.4, and one whose centre is nearly on a plane: planes stop what
+  !> is behind them, however deep.
+  subroutine check_deep_contacts()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    type(deep_contacts_t) :: deep
+
+    call add_grain(1, 1.0_dp, 0, -1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(2, 1.0_dp, 0, -0.86_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(3, 1.0_dp, 0, 1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(4, 1.0_dp, 0, 1.16_dp, 0.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call add_grain(5, 1.0_dp, 0, 0.0_dp, -1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp)
+    call make(sim, "gravity = 0, 0 /"//newline//"&boundary shape = 'plane', point = 0, -1.01, normal = 0, 1 /"//newline// &
+      & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
+    call sim%assemble(figures)
+    call deep%find(sim%decomposition, sim%halo, sim%problem)
+    call check_equal(int(deep%number), 1, "contacts that are deep")
+    call check_close(deep%deepest, 0.6_dp, solved, "the deepest of them")
+    call sim%free()
+  end subroutine check_deep_contacts
 
   !> An overlap is taken back in inverse proportion to the masses, without a velocity; no grain moves by more than half the alert
   !> distance.

@@ -14,7 +14,8 @@ program test_shape_geometry
   use gravier_known_corners, only: regular_polygon, platonic_solid, random_polygon, random_polyhedron
   use gravier_random_turn, only: random_turn
   use gravier_polyhedron, only: make_piece, make_capsule_piece
-  use gravier_polyhedra, only: cube, octahedron
+  use gravier_polyhedra, only: tetrahedron, cube, octahedron
+  use gravier_piece_width, only: half_width_of
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp, flat = 1.0e-9_dp
@@ -33,6 +34,7 @@ program test_shape_geometry
   call test_core_of_cube()
   call test_core_of_roof()
   call test_union()
+  call test_widths()
   call test_known_corners()
   call test_random_corners()
   call test_random_turns()
@@ -351,6 +353,35 @@ contains
     call check_close(mass%inertia(2, 2), 0.4_dp*volume, 0.5_dp/400**1.5_dp*mass%inertia(2, 2), "two balls: about their line")
     call check_close(mass%inertia(1, 1), (0.4_dp + 2.25_dp)*volume, 1.0e-4_dp*volume, "two balls: across it")
   end subroutine test_union
+
+  !> Half of the least width: between two faces of a cube and of an octahedron, between two edges of a tetrahedron, between a side
+  !> and a corner of a triangle, and of roundings alone.
+  subroutine test_widths()
+    type(convex_piece_t) :: piece
+    type(mass_t) :: mass
+    type(error_t), allocatable :: error
+    real(dp) :: ends(3, 2), eight(3, 8), six(3, 6), four(3, 4)
+
+    eight(:, :) = cube()
+    six(:, :) = octahedron()
+    four(:, :) = tetrahedron()
+    call make_piece("cube", eight, 0.1_dp, piece, mass, error)
+    call check_close(half_width_of(piece), 1.0_dp, tight, "half width of a cube of edge 2, rounded")
+    call make_piece("octahedron", six, 1.0e-6_dp, piece, mass, error)
+    call check_close(half_width_of(piece), 1.0_dp/sqrt(3.0_dp), 1.0e-5_dp, "half width of an octahedron")
+    ! faces are 4/sqrt(3) from the corner across, which is more
+    call make_piece("tetrahedron", four, 1.0e-6_dp, piece, mass, error)
+    call check_close(half_width_of(piece), 1.0_dp, 1.0e-5_dp, "half width of a tetrahedron")
+    ends(:, 1) = no_way
+    ends(:, 2) = third_axis
+    call make_capsule_piece("capsule", ends, 0.2_dp, piece, mass, error)
+    call check_close(half_width_of(piece), 0.2_dp, 0.0_dp, "half width of a capsule")
+    call check(.not. allocated(error), "the pieces are made")
+    deallocate (piece%vertex)
+    allocate (piece%vertex(2, 3))
+    piece%vertex(:, :) = reshape([0.0_dp, 0.0_dp, 4.0_dp, 0.0_dp, 0.0_dp, 3.0_dp], [2, 3])
+    call check_close(half_width_of(piece), 0.2_dp + 0.5_dp*2.4_dp, tight, "half width of a triangle, rounded")
+  end subroutine test_widths
 
   subroutine test_known_corners()
     real(dp), allocatable :: corner(:, :)
