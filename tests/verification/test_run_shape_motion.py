@@ -46,6 +46,7 @@ class ShapeMotion(RunTestCase):
         directory = prepare(self.here(title), dimension, rows, library)
         run = run_case(shaped_case(dimension, boundaries, *parts), ranks, directory)
         self.assert_status(run, 0)
+        self.latest = run
         return run.results()
 
     def top(self, steps, theta):
@@ -129,6 +130,9 @@ class ShapeMotion(RunTestCase):
             found = self.play(f"bar {dimension}", dimension, [body("bar", [0.0] * dimension, turn, spin=turns)], [plane], {
                 "scene": {"gravity": [0.0] * dimension, "density": mass / 0.01 ** (dimension - 1)}, "time": {"steps": 200},
                 "output": {"every": 200}}, library=library)
+            # velocity errors are compared with 0.3 of the velocity that has the energy of the spin
+            scale = self.latest.history()["velocity_scale"]
+            np.testing.assert_allclose(np.max(scale), 0.3 * spin * np.sqrt(inertia / mass), rtol=1e-6)
             velocity = found["/steps/200/bodies/velocity"][0]
             # the lower corner of the leading edge touches when the tip is at the plane
             lever = np.sqrt(0.5**2 + 0.005**2 - depth**2)
