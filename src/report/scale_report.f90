@@ -2,7 +2,7 @@
 !> scene is for.
 module gravier_scale_report
   use gravier_kinds, only: dp, i8
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, counted
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
   implicit none
@@ -137,7 +137,7 @@ contains
 
   end subroutine scale_warnings
 
-  !> That grains move too far in a step.
+  !> That the way of grains in a step is too long.
   function fast_warning(simulation, fast, step) result(text)
     type(simulation_t), intent(in) :: simulation
     !> how many
@@ -145,8 +145,9 @@ contains
     integer, intent(in) :: step
     character(len=:), allocatable :: text
 
-    text = to_text(fast)//" grains move by more than "// &
-      & trim(merge("half of their thickness", "their radius           ", simulation%effects%shapes))//" in step "//to_text(step)
+    text = "the radius"
+    if (simulation%effects%shapes) text = "half of the thickness"
+    text = "in step "//to_text(step)//" the way of "//counted(fast, "grain")//" is longer than "//text
   end function fast_warning
 
   !> That the step does not resolve the collisions of the stiffest compliant contacts.
