@@ -405,7 +405,7 @@ contains
     real(dp) :: free_grains
 
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
-    call self%tally%add_step(figures%max_overlap, figures%interface_statistics%overlapping_cores, &
+    call self%tally%add_step(figures%max_overlap, figures%interface_statistics, &
       & shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
       & self%physics%h*self%balance%speeds/free_grains)
     self%step = self%step + 1

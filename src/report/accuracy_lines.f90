@@ -93,6 +93,9 @@ contains
       if (tally%steps_with_cores > 0) text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
         & " steps bodies overlapped by more than their roundings, in one step at most "// &
         & to_text(tally%most_cores)//" pairs"//newline
+      if (tally%steps_stretched > 0) text = text//"warning     in "//to_text(tally%steps_stretched)//" of "// &
+        & counted(tally%steps, "step")//" intact bonds had gaps beyond those at which pairs are bonded, in one step at most "// &
+        & to_text(tally%most_stretched)//": bodies that turn drift apart, and bonds are lost; a smaller &time step helps"//newline
     end associate
   end function overlap_lines
 

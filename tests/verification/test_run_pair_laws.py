@@ -271,6 +271,15 @@ class Bonds(SmallScene):
         self.verify(case, "speed of the disk that stays [m/s]", record.velocity[:, 6, 1], 0.0, 1e-9)
         self.verify(case, "speed of the five that fall [m/s]", record.velocity[:, 7:, 1], fall[:, None], 1e-8)
 
+    def test_stretched(self):
+        """Two bonded disks that turn as one drift apart, and the log says so before the bond is lost; of two that turn little it says nothing."""
+        for rate, drifts in ((2 * np.pi, True), (0.1, False)):
+            grains = [Grain((side * RADIUS, 0), (0, side * rate * RADIUS), rate) for side in (-1, 1)]
+            self.step = 4e-3
+            record = self.play(f"pair that turns with {rate}", grains, [], (0, 0), 200, material=named("a"),
+                               law=[law("a", "bonded", bond_strength=1e6, bond_friction=1.0, bond_distance=1e-4)])
+            self.assertEqual("intact bonds had gaps beyond those at which pairs are bonded" in record.run.stdout, drifts)
+
     def test_broken_for_good(self):
         """A disk is torn from a ceiling and thrown back at it: the bond does not form again."""
         record = self.play("torn", [Grain((0, -RADIUS))], [plane((0, 0), (0, -1), material="b")], None, 200,

@@ -32,6 +32,8 @@ module gravier_interface
     integer(i8) :: ghosts = 0
     !> pairs of pieces of bodies with shapes whose cores overlap
     integer(i8) :: overlapping_cores = 0
+    !> contacts whose intact bond is stretched
+    integer(i8) :: stretched_bonds = 0
   end type interface_statistics_t
 
   !> Columns of a subproblem by what else is known of a body.
@@ -352,7 +354,7 @@ contains
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
     type(interface_statistics_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 6)
+    integer(i8) :: counts(n_multiplicities + 7)
     real(dp) :: extremes(4)
     logical, allocatable :: counted_elsewhere(:)
     integer :: s, b, c, k, m
@@ -385,6 +387,7 @@ contains
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%overlapping_cores
+        counts(n_multiplicities + 7) = counts(n_multiplicities + 7) + sub%stretched_bonds
         deallocate (counted_elsewhere)
       end associate
     end do
@@ -394,6 +397,7 @@ contains
     figures%bodies = sum(counts(2:n_multiplicities))
     figures%interactions = counts(n_multiplicities + 1)
     figures%overlapping_cores = counts(n_multiplicities + 6)
+    figures%stretched_bonds = counts(n_multiplicities + 7)
     figures%most_contacts = nint(extremes(1), i8)
     figures%least_contacts = nint(-extremes(2), i8)
     figures%neighbours = counts(n_multiplicities + 3)

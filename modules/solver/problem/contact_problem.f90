@@ -34,6 +34,8 @@ module gravier_contact_problem
     integer :: n_grouped = 0
     !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
     integer :: overlapping_cores = 0
+    !> contacts whose intact bond is stretched
+    integer :: stretched_bonds = 0
     !> identifiers (n_columns)
     integer(i8), allocatable :: id(:)
     !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)

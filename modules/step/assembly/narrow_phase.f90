@@ -3,7 +3,7 @@
 module gravier_narrow_phase
   use gravier_kinds, only: dp
   use gravier_contact_spring, only: spring_t
-  use gravier_contact_law, only: contact_pair_t, contact_terms_t
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, contact_terms_t
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
@@ -35,6 +35,8 @@ module gravier_narrow_phase
     type(contact_place_t), allocatable :: place(:)
     !> pairs of pieces whose cores overlap: more than their roundings
     integer :: overlapping_cores = 0
+    !> contacts whose intact bond is stretched, see `is_stretched`
+    integer :: stretched_bonds = 0
   end type contact_list_t
 
 contains
@@ -59,6 +61,7 @@ contains
     allocate (found%place(merge(room, 0, decomposition%no > 0)))
     found%n = 0
     found%overlapping_cores = 0
+    found%stretched_bonds = 0
     if (decomposition%no > 0) then
       call find_contacts_of_shapes(view, decomposition, physics, found)
     else
@@ -253,9 +256,22 @@ contains
     if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
     if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
     call keep_contact(view, found)
+    if (is_stretched(physics%laws%of(l)%law, pair, decomposition%rule%alert_distance)) &
+      & found%stretched_bonds = found%stretched_bonds + 1
     found%terms(c) = pair%terms
     if (size(found%spring) > 0) found%spring(c) = pair%spring
   end subroutine add_with_terms
+
+  !> Whether an intact bond has a gap beyond those at which pairs are bonded, and beyond half of the alert distance: bodies that turn
+  !> drift apart, and a bond is lost where they leave the range of contacts.
+  pure logical function is_stretched(law, pair, alert)
+    class(contact_law_t), intent(in) :: law
+    type(contact_pair_t), intent(in) :: pair
+    !> [m]
+    real(dp), intent(in) :: alert
+
+    is_stretched = law%breaks .and. pair%state /= 0 .and. pair%gap > max(law%range, 0.5_dp*alert)
+  end function is_stretched
 
   !> Whether what is open is no contact under these terms: what has restitution acts from the moment of touching on.
   pure logical function is_closed_under(terms)

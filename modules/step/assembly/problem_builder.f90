@@ -89,6 +89,7 @@ contains
       end do
       sub%n_contacts = found%n
       sub%overlapping_cores = found%overlapping_cores
+      sub%stretched_bonds = found%stretched_bonds
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. .not. boundaries(b)%is_driven()) cycle

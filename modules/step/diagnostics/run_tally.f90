@@ -4,6 +4,7 @@
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_creeping_groups, only: creep_t
+  use gravier_interface, only: interface_statistics_t
   use gravier_solve, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
@@ -47,6 +48,8 @@ module gravier_run_tally
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> steps in which cores of bodies with shapes overlapped, and the most pairs of pieces in one
     integer(i8) :: steps_with_cores = 0, most_cores = 0
+    !> steps in which intact bonds were stretched, and the most of them in one
+    integer(i8) :: steps_stretched = 0, most_stretched = 0
     !> of the solve that stagnated with most contacts that creep, and the largest change over the velocity scale of all such solves
     type(creep_t) :: creep
     real(dp) :: worst_creep = 0.0_dp
@@ -124,12 +127,12 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, overlapping_cores, mended, shift, path)
+  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
-    !> pairs of pieces whose cores overlap
-    integer(i8), intent(in) :: overlapping_cores
+    !> with the pairs of pieces whose cores overlap, and the bonds that are stretched
+    type(interface_statistics_t), intent(in) :: statistics
     !> a projection has shifted grains by more than rounding
     logical, intent(in) :: mended
     !> means over the free grains [m]
@@ -142,8 +145,10 @@ contains
       self%later_overlap = max(self%later_overlap, overlap)
     end if
     if (mended) self%projected = self%projected + 1
-    if (overlapping_cores > 0) self%steps_with_cores = self%steps_with_cores + 1
-    self%most_cores = max(self%most_cores, overlapping_cores)
+    if (statistics%overlapping_cores > 0) self%steps_with_cores = self%steps_with_cores + 1
+    self%most_cores = max(self%most_cores, statistics%overlapping_cores)
+    if (statistics%stretched_bonds > 0) self%steps_stretched = self%steps_stretched + 1
+    self%most_stretched = max(self%most_stretched, statistics%stretched_bonds)
     self%shift = self%shift + shift
     self%path = self%path + path
   end subroutine run_tally_add_step

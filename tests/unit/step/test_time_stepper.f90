@@ -2,7 +2,7 @@
 !> when space is divided, the contact in which a solve failed, the tally of a run.
 program test_time_stepper
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use gravier_kinds, only: dp, i8
+  use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_time_table, only: time_table_t
@@ -12,6 +12,7 @@ program test_time_stepper
   use gravier_load_areas, only: facing_area, find_load_areas
   use gravier_body_motion, only: move_to_middle, move_to_end, drive, count_fast
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
+  use gravier_interface, only: interface_statistics_t
   use gravier_run_tally, only: run_tally_t
   use gravier_search_direction, only: search_direction_t, chosen_direction
   use gravier_method_options, only: method_options_t
@@ -247,11 +248,13 @@ contains
     call check_close(tally%most_scale, 0.4_dp, 0.0_dp, "largest scale")
     call check_equal(tally%n_kinds, 2, "kinds of scales")
     call check_equal(int(tally%of_kind(1)), 5, "solves of the first kind")
-    call tally%add_step(0.3_dp, 0_i8, .true., 0.1_dp, 1.0_dp)
-    call tally%add_step(0.1_dp, 4_i8, .false., 0.0_dp, 2.0_dp)
-    call tally%add_step(0.5_dp, 3_i8, .false., 0.2_dp, 3.0_dp)
+    call tally%add_step(0.3_dp, interface_statistics_t(), .true., 0.1_dp, 1.0_dp)
+    call tally%add_step(0.1_dp, interface_statistics_t(overlapping_cores=4, stretched_bonds=2), .false., 0.0_dp, 2.0_dp)
+    call tally%add_step(0.5_dp, interface_statistics_t(overlapping_cores=3), .false., 0.2_dp, 3.0_dp)
     call check_equal(int(tally%steps_with_cores), 2, "steps in which cores overlapped")
     call check_equal(int(tally%most_cores), 4, "the most pairs in one of them")
+    call check_equal(int(tally%steps_stretched), 1, "steps in which bonds were stretched")
+    call check_equal(int(tally%most_stretched), 2, "the most bonds in one of them")
     call check_close(tally%mended_share(), 1.0_dp/3.0_dp, 1e-12_dp, "share of steps with projections")
     call check_close(tally%start_overlap, 0.3_dp, 0.0_dp, "overlap of the start")
     call check_close(tally%later_overlap, 0.5_dp, 0.0_dp, "overlap of later steps")
