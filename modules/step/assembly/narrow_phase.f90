@@ -262,8 +262,8 @@ contains
     if (size(found%spring) > 0) found%spring(c) = pair%spring
   end subroutine add_with_terms
 
-  !> Whether an intact bond has a gap beyond those at which pairs are bonded, and beyond half of the alert distance: bodies that turn
-  !> drift apart, and a bond is lost where they leave the range of contacts.
+  !> Whether an intact bond has a gap beyond those at which pairs are bonded, and beyond half of the alert distance: bodies that
+  !> turn drift apart, and a bond is lost where they leave the range of contacts.
   pure logical function is_stretched(law, pair, alert)
     class(contact_law_t), intent(in) :: law
     type(contact_pair_t), intent(in) :: pair
