@@ -1,6 +1,6 @@
-!> Bonds of Mohr's type: pairs that are near at the start of a run are bonded. An intact bond holds the bodies at the distance that
-!> they have, with tensions up to its strength F and shear |r_t| <= mu_b (r_n + h F); one that opens or slides in a step is broken
-!> for good, and the law is Coulomb's from the next step on.
+!> Bonds of Mohr's type: pairs that are near at the start of a run are bonded. An intact bond keeps the bodies from parting and
+!> from closing, to first order in the step, with tensions up to its strength F and shear |r_t| <= mu_b (r_n + h F). One that opens
+!> or slides in a step is broken for good, and the law is Coulomb's from the next step on.
 module gravier_bonded_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t

@@ -8,8 +8,8 @@ module gravier_deep_contacts
   private
   public :: deep_contacts_t
 
-  !> overlap over the half thickness of the thinner body from which on a contact is deep: bodies as thick that overlap by twice the
-  !> half thickness have their centres in one plane, and the contact has lost its side
+  !> A contact is deep from this overlap on, over the half thickness of the thinner body. Two equal slabs that overlap by twice
+  !> their half thickness have their centres in one plane: nothing tells any more on which side they were.
   real(dp), parameter :: deep = 0.5_dp
 
   type :: deep_contacts_t
