@@ -95,7 +95,8 @@ contains
         & to_text(tally%most_cores)//" pairs"//newline
       if (tally%steps_stretched > 0) text = text//"warning     in "//to_text(tally%steps_stretched)//" of "// &
         & counted(tally%steps, "step")//" intact bonds had gaps beyond those at which pairs are bonded, in one step at most "// &
-        & to_text(tally%most_stretched)//": bodies that turn drift apart, and bonds are lost; a smaller &time step helps"//newline
+        & to_text(tally%most_stretched)//": errors of solves add up to that, and a bond is lost where its pair is out of "// &
+        & "reach; a smaller accuracy helps"//newline
     end associate
   end function overlap_lines
 

@@ -13,6 +13,7 @@ module gravier_open_run
   use gravier_file_system, only: make_directory
   use gravier_own_files, only: check_own_files, forget_own_files
   use gravier_output_lock, only: output_lock_t
+  use gravier_load_areas, only: check_load_areas
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
@@ -138,6 +139,7 @@ contains
 
     step_start = MPI_Wtime()
     associate (simulation => self%simulation, figures => self%figures, log => self%log)
+      call check_load_areas(simulation%decomposition, error)
       call simulation%advance(figures, error, watch=log)
       if (allocated(error)) return
       call log%write_started(figures, error)

@@ -324,6 +324,7 @@ contains
       if (scene%laws%n > 0) then
         call add_law(scene%laws%largest)
         effects%cohesion = scene%laws%attracts
+        effects%bonds = scene%laws%breaks
         effects%compliance = scene%laws%yields
       end if
       ! moments are in the kernels of friction

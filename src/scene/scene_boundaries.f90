@@ -8,7 +8,7 @@ module gravier_scene_boundaries
   use gravier_surface_registry, only: make_surface
   use gravier_mesh_file, only: read_mesh
   use gravier_boundary, only: boundary_t, drive_names
-  use gravier_facing_planes, only: faces_along, open_axis
+  use gravier_facing_planes, only: faces_along, open_axis, is_pressed
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_config_surfaces, only: set_surface
   use gravier_config_laws, only: material_number
@@ -60,6 +60,7 @@ contains
     end do
     call comm%agree(error)
     do b = 1, size(boundaries)
+      boundaries(b)%faces = faces_along(boundaries(b))
       if (allocated(error)) exit
       call boundaries(b)%prescribe(nd, 0.0_dp)
       if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
@@ -153,14 +154,11 @@ contains
     real(dp), intent(in) :: period(:)
     type(boundary_t), intent(in) :: boundaries(:)
     type(error_t), allocatable, intent(inout) :: error
-    logical :: presses
     integer :: b
 
     do b = 1, size(boundaries)
       if (allocated(error)) return
-      presses = abs(boundaries(b)%given_pressure) > 0.0_dp
-      if (allocated(boundaries(b)%table%has)) presses = presses .or. boundaries(b)%table%has(merge(6, 10, nd == 2))
-      if (.not. presses) cycle
+      if (.not. is_pressed(boundaries(b), nd)) cycle
       call check_pressed(boundaries, b, nd, period, error)
       if (allocated(error)) error%message = file//": "//error%message
     end do
@@ -177,7 +175,7 @@ contains
     character(len=1), parameter :: axes(3) = ["x", "y", "z"]
     integer :: axis
 
-    axis = faces_along(boundaries(b))
+    axis = abs(faces_along(boundaries(b)))
     if (axis == 0) then
       call refuse("a plane whose normal lies along an axis")
       return

@@ -7,6 +7,7 @@ module gravier_test_scenes
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_layout_t, body_set_t
   use gravier_boundary, only: boundary_t
+  use gravier_facing_planes, only: faces_along
   use gravier_surface, only: surface_t
   use gravier_surface_registry, only: make_surface
   use gravier_neighbour_rule, only: neighbour_rule_t
@@ -173,6 +174,7 @@ contains
     boundary%surface%point(1:size(point)) = point
     boundary%pivot(:) = boundary%surface%point
     boundary%surface%axis(1:size(normal)) = normal
+    boundary%faces = faces_along(boundary)
   end function plane
 
   !> Give a boundary another shape, in its place.
@@ -189,6 +191,7 @@ contains
       surface%radius = boundary%surface%radius
     end if
     call move_alloc(surface, boundary%surface)
+    boundary%faces = faces_along(boundary)
   end subroutine change_shape
 
   !> Share a cloud out, by boxes or by cells. The last rank brings nobody, unless it is alone. Collective.

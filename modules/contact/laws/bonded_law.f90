@@ -1,5 +1,6 @@
 !> Bonds of Mohr's type: pairs that are near at the start of a run are bonded. An intact bond keeps the bodies from parting and
-!> from closing, to first order in the step, with tensions up to its strength F and shear |r_t| <= mu_b (r_n + h F). One that opens
+!> from closing, also where they turn as one (gravier_bond_turning), with tensions up to its strength F and shear
+!> |r_t| <= mu_b (r_n + h F). One that opens
 !> or slides in a step is broken for good, and the law is Coulomb's from the next step on.
 module gravier_bonded_law
   use gravier_kinds, only: dp
@@ -71,6 +72,7 @@ contains
     pair%terms%friction = self%bond_friction
     pair%terms%attraction = self%bond_strength
     pair%terms%free_gap = 0.0_dp
+    pair%terms%joins = .true.
   end subroutine bonded_evaluate
 
 end module gravier_bonded_law

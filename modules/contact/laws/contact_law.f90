@@ -26,6 +26,8 @@ module gravier_contact_law
     real(dp) :: attraction = 0.0_dp
     !> gap that the bodies may close in the step [m]
     real(dp) :: free_gap = 0.0_dp
+    !> the bodies are joined, across a gap or with an overlap, and move as one
+    logical :: joins = .false.
   end type contact_terms_t
 
   !> A pair of bodies under its law.

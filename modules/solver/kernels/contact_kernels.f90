@@ -60,13 +60,13 @@ contains
     integer, intent(in) :: dimension
     !> without friction no contact turns a disk or a sphere, spins are none of its unknowns, and tangential restitution and rolling
     !> have no meaning; where bodies have shapes, spins are unknowns, and rolling has none; compliant contacts are in the kernels of
-    !> friction, with a tangential shift
+    !> friction, with a tangential shift, which bonds have, too
     type(effects_t), intent(in) :: effects
     logical :: friction, shifted, rolling, compliant
 
     compliant = effects%compliance
     friction = effects%friction .or. effects%shapes .or. compliant
-    shifted = (friction .and. (effects%tangential_restitution .or. effects%moving_cell)) .or. compliant
+    shifted = (friction .and. (effects%tangential_restitution .or. effects%moving_cell .or. effects%bonds)) .or. compliant
     rolling = effects%friction .and. effects%rolling .and. .not. effects%shapes
     if (dimension == 2) then
       self%row = rows_of_disks(friction, shifted, rolling, effects%shapes, compliant)

@@ -4,15 +4,16 @@ module gravier_effects
   private
   public :: effects_t, n_effects, effect_name_length
 
-  integer, parameter :: n_effects = 18, effect_name_length = 24
+  integer, parameter :: n_effects = 19, effect_name_length = 24
 
   !> Deduced from materials, bodies, boundaries and loads (gravier_scene), not declared.
   type :: effects_t
     !> some contact has mu > 0; some frictional contact sends its tangential velocity back; some moment resists rolling, or pivoting
     !> (of spheres); some body is neither a disk nor a sphere; some contact yields: these five choose the kernels
     logical :: friction = .false., tangential_restitution = .false., rolling = .false., shapes = .false., compliance = .false.
-    !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion
-    logical :: pivoting = .false., restitution = .false., cohesion = .false.
+    !> what else contacts do: pivoting (in the kernels of rolling), normal restitution, cohesion; bonds, which have shifts along
+    !> their tangents
+    logical :: pivoting = .false., restitution = .false., cohesion = .false., bonds = .false.
     !> some grain turns; some axis is periodic; some boundary moves as prescribed, or is moved by forces; some grain is glued
     logical :: rotation = .false., periodic = .false., drives = .false., forces = .false., glued = .false.
     !> loads; grains are taken out; grains enter
@@ -67,6 +68,8 @@ contains
     on(17) = self%insertion
     names(18) = "moving cell"
     on(18) = self%moving_cell
+    names(19) = "bonds"
+    on(19) = self%bonds
   end subroutine effects_list
 
 end module gravier_effects

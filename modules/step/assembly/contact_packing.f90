@@ -4,7 +4,7 @@ module gravier_contact_packing
   use gravier_boundary, only: boundary_t
   use gravier_contact_law, only: contact_terms_t
   use gravier_law_set, only: law_set_t
-  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius, contact_tangents
   use gravier_sweep_order, only: group_contacts
   use gravier_contact_problem, only: subproblem_t
   use gravier_cell_response, only: image_velocity
@@ -12,6 +12,7 @@ module gravier_contact_packing
   use gravier_surface_velocity, only: contact_place_t
   use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
+  use gravier_bond_turning, only: find_bond_velocity
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, place_of
   implicit none
@@ -76,14 +77,15 @@ contains
       sub%source(c) = this%p
       sub%gap(c) = found%gap(this%f)
       sub%pair(:, c) = pair(:, this%f)
+      call take_terms(view, found, boundaries, physics%laws, before, this)
       if (this%b > 0) then
         if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub, start)
       end if
       if (physics%cell%moves) call pack_image(view, this, sub)
-      call take_terms(view, found, boundaries, physics%laws, before, this)
       call pack_terms(view, found, kernels, physics%h, this, sub)
     end do
     if (needs_start) call pack_returned(view, found, boundaries, kernels, physics, start, sub)
+    if (physics%laws%breaks) call pack_bonds(view, found, boundaries, kernels, physics, sub)
     do c = 1, merge(found%n, 0, physics%cell%moves)
       call keep_shifts(kernels, c, sub)
     end do
@@ -219,7 +221,7 @@ contains
     integer :: nd
 
     nd = size(points, 1)
-    place = place_of(view, found, this%f)
+    place = place_of(view, found, this%f, this%terms%joins)
     points(:, 1) = view%bodies%position(:, this%i) + place%arm_i(1:nd)
     if (this%j > 0) then
       points(:, 2) = view%bodies%position(:, this%j) + place%arm_j(1:nd)
@@ -237,18 +239,25 @@ contains
     real(dp), intent(in) :: h
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
+    real(dp) :: reach
 
     associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row, terms => this%terms)
       sub%hot(q, 1:kernels%nd, g) = found%normal(:, this%f)
       if (row%arm_i > 0) then
         call pack_arms(view, found, kernels, this, sub)
       else if (row%lever_i > 0) then
-        sub%hot(q, row%lever_i, g) = merge(view%bodies%radius(i), 0.0_dp, view%bodies%glued(i) == 0)
+        reach = 0.0_dp
+        if (terms%joins) reach = merge(0.5_dp, 1.0_dp, j > 0)*found%gap(this%f)
+        sub%hot(q, row%lever_i, g) = merge(view%bodies%radius(i) + reach, 0.0_dp, view%bodies%glued(i) == 0)
         sub%hot(q, row%lever_j, g) = 0.0_dp
-        if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j), 0.0_dp, view%bodies%glued(j) == 0)
+        if (j > 0) sub%hot(q, row%lever_j, g) = merge(view%bodies%radius(j) + reach, 0.0_dp, view%bodies%glued(j) == 0)
       end if
       sub%hot(q, row%shift, g) = terms%free_gap/h
-      if (allocated(sub%attraction)) sub%attraction(q, g) = h*terms%attraction
+      if (allocated(sub%attraction)) then
+        sub%attraction(q, g) = h*terms%attraction
+        ! what touches starts as if its attraction did nothing: the bodies press against each other by as much
+        if (.not. terms%free_gap > 0.0_dp) sub%impulse(q, 1, g) = h*terms%attraction
+      end if
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction
       if (row%shift_t > 0) sub%hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g) = 0.0_dp
@@ -332,6 +341,35 @@ contains
     end do
   end subroutine pack_returned
 
+  !> The velocities that bonds have in bodies that turn: shifts of the law, which holds for v + shift.
+  subroutine pack_bonds(view, found, boundaries, kernels, physics, sub)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: velocity(kernels%nd), t(3), s(3)
+    type(packed_t) :: this
+    integer :: c
+
+    do c = 1, found%n
+      call find_packed(view, found, c, this)
+      if (.not. found%terms(this%f)%joins) cycle
+      call find_bond_velocity(view, boundaries, physics, this%p, place_of(view, found, this%f, joined=.true.), velocity)
+      associate (contact => sub%hot(this%q, :, this%g), row => kernels%row)
+        contact(row%shift) = -sum(velocity*contact(1:kernels%nd))
+        if (kernels%nd == 2) then
+          contact(row%shift_t) = contact(2)*velocity(1) - contact(1)*velocity(2)
+        else
+          call contact_tangents(sub%hot, c, t, s)
+          contact(row%shift_t) = -sum(velocity*t)
+          contact(row%shift_s) = -sum(velocity*s)
+        end if
+      end associate
+    end do
+  end subroutine pack_bonds
+
   !> What a cell that moves adds to the normal velocity without contacts.
   pure real(dp) function cell_adds(found, physics, this, sub)
     type(contact_list_t), intent(in) :: found
@@ -354,7 +392,7 @@ contains
     type(contact_place_t) :: place
     logical :: free
 
-    place = place_of(view, found, this%f)
+    place = place_of(view, found, this%f, this%terms%joins)
     if (view%bodies%glued(this%i) > 0) place%arm_i(:) = 0.0_dp
     free = .false.
     if (this%j > 0) free = view%bodies%glued(this%j) == 0

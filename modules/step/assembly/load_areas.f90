@@ -1,11 +1,12 @@
 !> Areas that loads on boundaries work on.
 module gravier_load_areas
   use gravier_kinds, only: dp
-  use gravier_facing_planes, only: find_facing_planes
+  use gravier_errors, only: error_t, raise, status_failure
+  use gravier_facing_planes, only: find_facing_planes, is_pressed
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: facing_area, find_load_areas
+  public :: facing_area, find_load_areas, check_load_areas
 
 contains
 
@@ -16,15 +17,17 @@ contains
 
     area = 0.0_dp
     associate (boundary => decomposition%boundaries(b))
-      if (boundary%is_plane()) area = area_across(decomposition, maxloc(abs(boundary%surface%axis), dim=1))
+      if (boundary%is_plane()) area = area_across(decomposition, boundary%load_axis(), boundary%surface%point)
     end associate
   end function facing_area
 
-  !> Area of the scene across axis `main`: along every other axis, the way between the two planes that face each other
-  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m: no pressure works there (check_pressed).
-  pure real(dp) function area_across(decomposition, main) result(area)
+  !> Area of the scene across axis `main` at a place: along every other axis, the way between the two planes that face each other
+  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m: no pressure works there (check_load_areas).
+  pure real(dp) function area_across(decomposition, main, place) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: main
+    !> [m]
+    real(dp), intent(in) :: place(3)
     real(dp) :: low, high
     integer :: d
 
@@ -32,7 +35,7 @@ contains
     associate (boundaries => decomposition%boundaries, length => decomposition%period%length)
       do d = 1, decomposition%nd
         if (d == main) cycle
-        call find_facing_planes(boundaries, d, low, high)
+        call find_facing_planes(boundaries, d, place, low, high)
         if (length(d) > 0.0_dp) then
           area = area*length(d)
         else if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) then
@@ -48,6 +51,7 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
     real(dp), intent(out) :: area(:)
+    real(dp) :: place(3)
     integer :: b
 
     area(:) = 0.0_dp
@@ -55,9 +59,36 @@ contains
       associate (boundary => decomposition%boundaries(b))
         if (.not. boundary%is_driven()) cycle
         if (allocated(boundary%surface)) area(b) = boundary%surface%own_area()
-        if (.not. area(b) > 0.0_dp) area(b) = area_across(decomposition, boundary%load_axis())
+        if (area(b) > 0.0_dp) cycle
+        place(:) = boundary%pivot
+        if (allocated(boundary%surface)) place(:) = boundary%surface%point
+        area(b) = area_across(decomposition, boundary%load_axis(), place)
       end associate
     end do
   end subroutine find_load_areas
+
+  !> Fails (status_failure) where the area of a pressure is not known any more, because planes have turned away from each other.
+  !> The same on all ranks.
+  subroutine check_load_areas(decomposition, error)
+    type(decomposition_t), intent(in) :: decomposition
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+    real(dp) :: low, high
+    integer :: b, d
+
+    do b = 1, size(decomposition%boundaries)
+      associate (boundary => decomposition%boundaries(b))
+        if (.not. (boundary%present .and. boundary%is_plane() .and. is_pressed(boundary, decomposition%nd))) cycle
+        do d = 1, decomposition%nd
+          if (d == boundary%load_axis() .or. decomposition%period%length(d) > 0.0_dp) cycle
+          call find_facing_planes(decomposition%boundaries, d, boundary%surface%point, low, high)
+          if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) cycle
+          call raise(error, status_failure, "boundary '"//boundary%name//"': pressure: expected two planes that face "// &
+            & "each other along "//axes(d)//", but one of them has turned by more than 84 degrees, so that the area is not known")
+          return
+        end do
+      end associate
+    end do
+  end subroutine check_load_areas
 
 end module gravier_load_areas

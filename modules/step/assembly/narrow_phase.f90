@@ -247,7 +247,7 @@ contains
       pair%gap = gap
       if (row > 0) pair%state = view%list%state(row, p)
       if (physics%laws%of(l)%law%sees_velocity) call find_pair_velocity(view, decomposition%boundaries, p, &
-        & place_of(view, found, c), found%normal(:, c), pair)
+        & place_of(view, found, c, joined=.false.), found%normal(:, c), pair)
       call evaluate_pair(view, physics%laws%of(l)%law, p, pair)
       if (row > 0) view%list%state(row, p) = pair%state
     else
@@ -262,8 +262,8 @@ contains
     if (size(found%spring) > 0) found%spring(c) = pair%spring
   end subroutine add_with_terms
 
-  !> Whether an intact bond has a gap beyond those at which pairs are bonded, and beyond half of the alert distance: bodies that
-  !> turn drift apart, and a bond is lost where they leave the range of contacts.
+  !> Whether an intact bond has a gap beyond those at which pairs are bonded, and beyond half of the alert distance: errors of
+  !> solves have added up, and a bond is lost where its pair leaves the range of contacts.
   pure logical function is_stretched(law, pair, alert)
     class(contact_law_t), intent(in) :: law
     type(contact_pair_t), intent(in) :: pair
@@ -290,15 +290,17 @@ contains
   end subroutine keep_contact
 
   !> Where contact `f` of those found is.
-  pure type(contact_place_t) function place_of(view, found, f) result(place)
+  pure type(contact_place_t) function place_of(view, found, f, joined) result(place)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     integer, intent(in) :: f
+    !> its bodies are joined
+    logical, intent(in) :: joined
 
     if (size(found%place) > 0) then
       place = found%place(f)
     else
-      place = round_place(view, found%source(f), found%gap(f), found%normal(:, f))
+      place = round_place(view, found%source(f), found%gap(f), found%normal(:, f), joined)
     end if
   end function place_of
 

@@ -21,21 +21,25 @@ module gravier_surface_velocity
 
 contains
 
-  !> Where the disks or spheres of pair `p` touch, or one of them a boundary: on their surfaces, across the gap.
-  pure type(contact_place_t) function round_place(view, p, gap, normal) result(place)
+  !> Where the disks or spheres of pair `p` touch, or one of them a boundary: on their surfaces, across the gap. Both arms of bodies
+  !> that are joined lead to one point, in the middle of the gap or on the boundary.
+  pure type(contact_place_t) function round_place(view, p, gap, normal, joined) result(place)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
     !> [m]
     real(dp), intent(in) :: gap
     !> (nd) from the antagonist to the candidate
     real(dp), intent(in) :: normal(:)
+    logical, intent(in) :: joined
+    real(dp) :: reach
     integer :: nd
 
     nd = size(normal)
     associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      place%arm_i(1:nd) = -view%bodies%radius(i)*normal
+      reach = merge(merge(0.5_dp, 1.0_dp, j > 0)*gap, 0.0_dp, joined)
+      place%arm_i(1:nd) = -(view%bodies%radius(i) + reach)*normal
       if (j > 0) then
-        place%arm_j(1:nd) = view%bodies%radius(j)*normal
+        place%arm_j(1:nd) = (view%bodies%radius(j) + reach)*normal
       else
         call find_wall_point(view, i, gap, normal, place%on_wall(1:nd))
       end if

@@ -13,13 +13,14 @@ module gravier_scene_extent
 contains
 
   !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that shut
-  !> it in, with the outermost points of the grains in the place of planes that are not there. No length where neither planes nor
-  !> grains bound it. Collective.
+  !> it in, with the outermost points of the grains in the place of planes that are not there. Planes that have turned count where
+  !> they are at the middle of the other axes. No length where neither planes nor grains bound it. Collective.
   subroutine find_extent(decomposition, low, high, length)
     type(decomposition_t), intent(in) :: decomposition
     !> (nd) [m]
     real(dp), intent(out) :: low(:), high(:), length(:)
     real(dp) :: extremes(2*decomposition%nd), reach(2*decomposition%nd)
+    real(dp) :: middle(3)
     integer :: s, k, d, nd
 
     nd = decomposition%nd
@@ -34,6 +35,15 @@ contains
       end associate
     end do
     call decomposition%comm%highest_of(extremes)
+    middle(:) = 0.0_dp
+    do d = 1, nd
+      call find_facing_planes(decomposition%boundaries, d, middle, low(d), high(d))
+      if (low(d) > -huge(1.0_dp)) extremes(d) = -low(d)
+      if (high(d) < huge(1.0_dp)) extremes(nd + d) = high(d)
+    end do
+    do d = 1, nd
+      if (min(extremes(d), extremes(nd + d)) > -huge(1.0_dp)) middle(d) = 0.5_dp*(extremes(nd + d) - extremes(d))
+    end do
     do d = 1, nd
       if (decomposition%period%length(d) > 0.0_dp) then
         low(d) = decomposition%period%origin(d)
@@ -41,7 +51,7 @@ contains
         high(d) = low(d) + length(d)
         cycle
       end if
-      call find_facing_planes(decomposition%boundaries, d, low(d), high(d))
+      call find_facing_planes(decomposition%boundaries, d, middle, low(d), high(d))
       if (.not. low(d) > -huge(1.0_dp)) low(d) = min(-extremes(d), high(d))
       if (.not. high(d) < huge(1.0_dp)) high(d) = max(extremes(nd + d), low(d))
       ! neither planes nor grains

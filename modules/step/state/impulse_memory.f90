@@ -74,7 +74,7 @@ contains
   end subroutine keep_impulses
 
   !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now; a
-  !> moment keeps its vector.
+  !> moment keeps its vector. Contacts that pressed nothing start as they were packed.
   subroutine recall_impulses(halo, problem)
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
@@ -90,13 +90,13 @@ contains
         do g = 1, n_blocks(sub%n_contacts)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
-            if (problem%kernels%nf < 3) then
-              sub%impulse(q, :, g) = list%impulse(:, sub%source(c))
-            else
-              sub%impulse(q, 1, g) = list%impulse(1, sub%source(c))
-              vector(q, :) = list%impulse(2:4, sub%source(c))
-              if (rolls) moment(q, :) = list%impulse(5:7, sub%source(c))
-            end if
+            associate (kept => list%impulse(:, sub%source(c)))
+              if (problem%kernels%nf == 3) vector(q, :) = kept(2:4)
+              if (problem%kernels%nf == 3 .and. rolls) moment(q, :) = kept(5:7)
+              if (.not. kept(1) > 0.0_dp) cycle
+              sub%impulse(q, 1, g) = kept(1)
+              if (problem%kernels%nf < 3) sub%impulse(q, 2:, g) = kept(2:)
+            end associate
           end do
           ! contacts of no effect have no normal, and no frame
           if (problem%kernels%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))

@@ -4,9 +4,7 @@
 !>
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
 !>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
-!> attraction
-!>            of the laws where there is no other load, which are internal forces else; the root mean square of what applied forces
-!>            add to velocities
+!>            root mean square of what applied forces add to velocities; of attractions, where there is no other load
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
@@ -16,7 +14,9 @@
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
 !>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else
 !>            stress; f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
-!> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other.
+!> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other. Attractions balance
+!> each other inside of bodies, and say as little of what moves as the strength of a wall: where they alone are the load, U_q is
+!> min(load, creep).
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
@@ -25,6 +25,7 @@ module gravier_velocity_scale
   use gravier_body_mass, only: mass_product
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
+  use gravier_boundary_levers, only: find_levers
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
@@ -72,6 +73,8 @@ module gravier_velocity_scale
     real(dp) :: duration = 0.0_dp
     !> largest coefficient of restitution of the laws
     real(dp) :: restitution = 0.0_dp
+    !> the load is that of attractions, in the place of another one
+    logical :: internal = .false.
     !> what the mean attraction of a bond that may break for good gives to the mean grain in a step; 0 without bonds [m/s]
     real(dp) :: bonds = 0.0_dp
     !> U_q [m/s], and the part of the motion that errors are compared with
@@ -126,53 +129,6 @@ contains
     call comm%highest_of(self%lever)
   end subroutine velocity_scale_init
 
-  !> Distance from its pivot, across the axis that it turns about, up to which each boundary reaches grains: that of its
-  !> farthest point, of the farthest glued grain, or, of a plane, which has no end, of the farthest grain.
-  subroutine find_levers(grains, boundaries, lever)
-    type(body_set_t), intent(in) :: grains
-    type(boundary_t), intent(in) :: boundaries(:)
-    !> (boundaries) [m]
-    real(dp), intent(out) :: lever(:)
-    real(dp) :: place(3), corner(3, 8)
-    integer :: b, k, n
-
-    lever(:) = 0.0_dp
-    do b = 1, size(boundaries)
-      associate (boundary => boundaries(b))
-        if (.not. boundary%turns()) cycle
-        if (boundary%is_glued() .or. boundary%is_plane()) then
-          do k = 1, grains%n
-            if (boundary%is_glued() .and. grains%glued(k) /= b) cycle
-            place(:) = 0.0_dp
-            place(1:grains%nd) = grains%position(:, k)
-            lever(b) = max(lever(b), arm(boundary, place) + grains%radius(k))
-          end do
-        else
-          associate (surface => boundary%surface)
-            call surface%find_box(n, corner)
-            do k = 1, n
-              lever(b) = max(lever(b), arm(boundary, corner(:, k)) + surface%radius)
-            end do
-          end associate
-        end if
-      end associate
-    end do
-  end subroutine find_levers
-
-  !> Distance of a point from the axis through the pivot, or from the pivot where only a table knows the axis [m].
-  pure real(dp) function arm(boundary, place)
-    type(boundary_t), intent(in) :: boundary
-    real(dp), intent(in) :: place(3)
-    real(dp) :: way(3), axis(3)
-
-    way(:) = place - boundary%pivot
-    if (norm2(boundary%given_spin) > 0.0_dp) then
-      axis(:) = boundary%given_spin/norm2(boundary%given_spin)
-      way(:) = way - sum(way*axis)*axis
-    end if
-    arm = norm2(way)
-  end function arm
-
   !> Find the velocity of a step from its contact problem, whose boundaries hold the velocities of the end of the step as far as
   !> no contact acts on them, and tell the problem. One reduction. Collective.
   subroutine velocity_scale_measure(self, decomposition, physics, problem, time, area)
@@ -209,7 +165,8 @@ contains
     if (sums(2) > 0.0_dp .and. self%mass > 0.0_dp) attraction = sqrt(sums(1)/sums(2))/self%mass
     self%bonds = merge(attraction, 0.0_dp, physics%laws%breaks)
     ! attractions hold bodies together and move none of them but where there is no other load
-    if (.not. self%load > 0.0_dp) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
+    self%internal = .not. self%load > 0.0_dp .and. attraction > 0.0_dp
+    if (self%internal) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
     self%stress = 0.0_dp
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%own = 0.0_dp
@@ -478,12 +435,12 @@ contains
       self%kind = "contact forces"
     end if
     slow = max(self%drive, self%creep)
-    if (self%drive > 0.0_dp .and. (slow < self%load .or. .not. self%load > 0.0_dp)) then
+    if ((self%drive > 0.0_dp .or. self%internal .and. slow > 0.0_dp) .and. (slow < self%load .or. .not. self%load > 0.0_dp)) then
       self%value = slow
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"
     end if
-    self%quiet = self%value
+    self%quiet = merge(0.0_dp, self%value, self%internal .and. .not. self%drive > 0.0_dp)
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
       self%value = self%share*self%own

@@ -12,6 +12,7 @@ program test_velocity_scale
   use gravier_boundary, only: boundary_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_test_scenes, only: plane, change_shape
+  use gravier_boundary_levers, only: find_levers
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -122,6 +123,7 @@ contains
     type(velocity_scale_t) :: scale
     type(body_set_t) :: grains
     type(boundary_t) :: boundaries(5)
+    real(dp) :: lever(5)
     integer :: b
 
     do b = 1, 4, 3
@@ -148,6 +150,8 @@ contains
     grains%glued(2) = 3
     grains%position(:, 1) = [6.0_dp, 8.0_dp, 100.0_dp]
     grains%position(:, 2) = [1.0_dp, 0.0_dp, 2.0_dp]
+    call find_levers(grains, boundaries, lever)
+    call check_close(lever(2), 10.5_dp, rounding, "lever of a plane, by the grains of one rank")
     if (comm%rank < comm%size - 1) grains%position(:, :) = 0.5_dp*grains%position
     call scale%init(comm, grains, boundaries, 1.0_dp, 0.0_dp)
     call check_close(scale%lever(1), 5.0_dp, rounding, "lever of a rectangle that turns")
@@ -253,8 +257,16 @@ contains
     call check_scale(sim, step*1.0e-3_dp, "load of a step", "weight beside attraction")
     scene%gravity = 0.0_dp
     call assemble(comm, scene, sim)
-    call check_scale(sim, step*3.0_dp/mass, "load of a step", "attraction")
-    call check_close(sim%velocity_scale%own, 0.0_dp, rounding*step*3.0_dp/mass, "at rest under attraction nothing moves")
+    call check_scale(sim, creep, "creep", "attraction alone, which is balanced inside of bodies")
+    call check_close(sim%velocity_scale%load, step*3.0_dp/mass, rounding*step*3.0_dp/mass, "load by attraction alone")
+    scene%motion = 1.0_dp
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.3_dp*sim%velocity_scale%own, "motion of the bodies", "attraction of bodies that move")
+    scene%motion = 0.0_dp
+    scene%adhesion = 0.5_dp*creep*mass/step
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.5_dp*creep, "load of a step", "attraction that is weaker than creep")
+    call check_close(sim%velocity_scale%own, 0.0_dp, rounding*creep, "at rest under attraction nothing moves")
   end subroutine test_loads
 
   subroutine test_drives(nd)

@@ -11,7 +11,7 @@ program test_small_modules
   use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
   use gravier_test_scenes, only: plane, change_shape
-  use gravier_check, only: check, check_close, finish_checks
+  use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
   call check_magnitudes()
@@ -85,9 +85,12 @@ contains
   end function resident
 
   !> The highest plane that faces up and the lowest one that faces down; slopes, circles and planes that are gone do not count.
+  !> Planes that have turned count where they meet the line along the axis through a place.
   subroutine check_facing_planes()
     type(boundary_t) :: planes(6)
-    real(dp) :: low, high
+    real(dp), parameter :: origin(3) = 0.0_dp
+    real(dp) :: low, high, angle
+    integer :: k
 
     planes(1) = plane(1, [0.0_dp, 0.1_dp], [0.0_dp, 1.0_dp])
     planes(2) = plane(2, [5.0_dp, 0.3_dp], [0.0_dp, 1.0_dp])
@@ -96,15 +99,30 @@ contains
     planes(5) = plane(5, [0.0_dp, 1.5_dp], [0.0_dp, -1.0_dp])
     planes(6) = plane(6, [-3.0_dp, 0.0_dp], [1.0_dp, 0.0_dp])
     planes(5)%present = .false.
-    call find_facing_planes(planes, 2, low, high)
+    call find_facing_planes(planes, 2, origin, low, high)
     call check_close(low, 0.3_dp, 0.0_dp, "the highest floor")
     call check_close(high, 2.0_dp, 0.0_dp, "the lowest lid that is there")
-    call find_facing_planes(planes, 1, low, high)
+    call find_facing_planes(planes, 1, origin, low, high)
     call check_close(low, -3.0_dp, 0.0_dp, "the plane that faces along x")
     call check(high >= huge(high), "nothing faces against x")
     call change_shape("circle", planes(2))
-    call find_facing_planes(planes, 2, low, high)
+    call find_facing_planes(planes, 2, origin, low, high)
     call check_close(low, 0.1_dp, 0.0_dp, "a circle is no plane")
+    planes(1) = plane(1, [0.0_dp, 0.0_dp], [1.0_dp, 0.0_dp])
+    planes(2) = plane(2, [0.19_dp, 0.0_dp], [-1.0_dp, 0.0_dp])
+    call check_equal(planes(2)%faces, -1, "a plane that faces down the first axis")
+    do k = 0, 14
+      angle = 0.1_dp*k
+      planes(1)%surface%axis(1) = cos(angle)
+      planes(1)%surface%axis(2) = -sin(angle)
+      planes(2)%surface%axis(1:2) = -planes(1)%surface%axis(1:2)
+      call find_facing_planes(planes(1:2), 1, [7.0_dp, 0.05_dp, 0.0_dp], low, high)
+      call check_close(high - low, 0.19_dp, 1e-14_dp, "way between parallel planes that turn")
+      call check_close(low, 0.05_dp*tan(angle), 1e-14_dp, "where a plane that turns about its foot is above it")
+    end do
+    planes(1)%surface%axis(1:2) = [cos(1.5_dp), -sin(1.5_dp)]
+    call find_facing_planes(planes(1:2), 1, origin, low, high)
+    call check(low <= -huge(low), "a plane that has turned by 86 degrees faces no more")
   end subroutine check_facing_planes
 
 end program test_small_modules

@@ -12,6 +12,7 @@ program test_narrow_phase
   use gravier_surface_velocity, only: round_place, find_start_velocity, find_surface_velocity, find_wall_point
   use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair
   use gravier_physics, only: physics_t
+  use gravier_bond_turning, only: find_bond_velocity
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
   use gravier_test_law_names, only: add_law
@@ -33,6 +34,7 @@ program test_narrow_phase
   call check_velocities()
   call check_turning_boundary()
   call check_start_velocities()
+  call check_bond_velocities()
   call finish_checks()
 
 contains
@@ -330,7 +332,7 @@ contains
     view%bodies%velocity(:, 1) = [1.0_dp, 2.0_dp, 3.0_dp, 4.0_dp, 5.0_dp, 6.0_dp]
     view%bodies%velocity(:, 2) = [0.5_dp, -1.0_dp, 0.25_dp, -2.0_dp, 3.0_dp, 1.0_dp]
     call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
-    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n), n, pair)
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n, joined=.false.), n, pair)
     call evaluate_pair(view, physics%laws%of(1)%law, 1, pair)
     ! V + w x (-0.1 n) of the first grain, less V + w x (0.1 n) of the second
     v = cross([4.0_dp, 5.0_dp, 6.0_dp], n)
@@ -345,15 +347,74 @@ contains
     call make(2, reshape([0.0_dp, 0.1_dp], [2, 1]), view, decomposition)
     view%bodies%velocity(:, 1) = [0.3_dp, -0.2_dp, 5.0_dp]
     call list(view, reshape([1, -1], [2, 1]), pair_memory_t())
-    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp], joined=.false.), &
       & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%normal_velocity, -0.2_dp, rounding, "a disk approaches a plane")
     call check_close(pair%slip, 0.8_dp, rounding, "and slips: 0.3 + 5 0.1")
     decomposition%boundaries(1)%last_velocity(1) = 0.8_dp
-    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp]), &
+    call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, [0.0_dp, 1.0_dp], joined=.false.), &
       & [0.0_dp, 1.0_dp], pair)
     call check_close(pair%slip, 0.0_dp, rounding, "a plane that moves with it")
   end subroutine check_velocities
+
+  !> Two spheres that turn as one about a line through the origin, w x r at the start of the step: with the velocity of their bond
+  !> they end on their circles, w x r again. The velocity of a bond to what turns as a boundary is that of the centre of the sphere.
+  subroutine check_bond_velocities()
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    real(dp), parameter :: spin(3) = [3.0_dp, -2.0_dp, 1.5_dp], h = 0.05_dp
+    real(dp) :: start(3, 2), moving(3, 2), places(3, 2), velocity(3), ahead(3), arm(3), exact(3), turned(3), n(3), gap
+    integer :: k
+
+    physics%h = h
+    start(:, 1) = [0.3_dp, 0.4_dp, -0.2_dp]
+    start(:, 2) = start(:, 1) + 0.23_dp*[0.6_dp, 0.0_dp, 0.8_dp]
+    do k = 1, 2
+      call turn(spin, start(:, k), moving(:, k))
+      places(:, k) = start(:, k) + 0.5_dp*h*moving(:, k)
+    end do
+    call make(3, places, view, decomposition)
+    do k = 1, 2
+      view%bodies%velocity(1:3, k) = moving(:, k)
+      view%bodies%velocity(4:6, k) = spin
+    end do
+    call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
+    arm(:) = places(:, 1) - places(:, 2)
+    gap = norm2(arm) - 0.2_dp
+    n(:) = arm/norm2(arm)
+    call find_bond_velocity(view, decomposition%boundaries, physics, 1, round_place(view, 1, gap, n, joined=.true.), velocity)
+    call turn(spin, arm, exact)
+    exact(:) = exact + velocity
+    ahead(:) = arm + 0.5_dp*h*exact
+    call check_close(norm2(ahead), 0.23_dp, 10*rounding, "spheres that turn as one keep their distance")
+    call turn(spin, ahead, turned)
+    call check_close(maxval(abs(exact - turned)), 0.0_dp, 10*rounding, "and their velocity turns with them")
+    ! the second one is part of a boundary that turns about the origin as before
+    view%bodies%glued(2) = 2
+    decomposition%boundaries(2)%last_spin(:) = spin
+    decomposition%boundaries(2)%pivot(:) = 0.0_dp
+    call find_bond_velocity(view, decomposition%boundaries, physics, 1, round_place(view, 1, gap, n, joined=.true.), velocity)
+    call turn(spin, places(:, 1), exact)
+    exact(:) = exact + velocity
+    ahead(:) = places(:, 1) + 0.5_dp*h*exact
+    call check_close(norm2(ahead), norm2(start(:, 1)), 10*rounding, "a sphere goes round with a glued one")
+    ! slow turning is left alone
+    view%bodies%glued(2) = 0
+    view%bodies%velocity(:, :) = 1.0e-4_dp*view%bodies%velocity
+    call find_bond_velocity(view, decomposition%boundaries, physics, 1, round_place(view, 1, gap, n, joined=.true.), velocity)
+    call check_close(maxval(abs(velocity)), 0.0_dp, 0.0_dp, "what hardly turns has bonds at rest")
+  end subroutine check_bond_velocities
+
+  !> spin x arm
+  pure subroutine turn(spin, arm, velocity)
+    real(dp), intent(in) :: spin(3), arm(3)
+    real(dp), intent(out) :: velocity(3)
+
+    velocity(1) = spin(2)*arm(3) - spin(3)*arm(2)
+    velocity(2) = spin(3)*arm(1) - spin(1)*arm(3)
+    velocity(3) = spin(1)*arm(2) - spin(2)*arm(1)
+  end subroutine turn
 
   pure function cross(a, b) result(c)
     real(dp), intent(in) :: a(3), b(3)
@@ -390,7 +451,7 @@ contains
       call list(view, reshape([1, 2], [2, 1]), pair_memory_t())
       n(1) = 0.0_dp
       n(2) = merge(-1.0_dp, 1.0_dp, order == 1)
-      call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n), n, pair)
+      call find_pair_velocity(view, decomposition%boundaries, 1, round_place(view, 1, pair%gap, n, joined=.false.), n, pair)
       ! at (1, 0.1) the boundary has the velocity (-0.3, 3)
       call check_close(pair%slip, 0.8_dp, 10*rounding, "slip against a glued grain, in either order")
       call check_close(pair%normal_velocity, -3.0_dp, 10*rounding, "approach of a glued grain, in either order")
