@@ -57,6 +57,30 @@ class ShapeLaws(RunTestCase):
                     spins = [self.track(run, "velocity", place)[:, dimension:] for place in (0, 1)]
                     np.testing.assert_allclose(spins[0], spins[1], atol=1e-3 * rate)
 
+    def test_flush_joints(self):
+        """A block slides over the joint of two blocks side by side, loose on a plane or glued, of two segments or two rectangles: with or without
+        friction it keeps the velocity that it has on one block, at any step."""
+        for dimension in (2, 3):
+            base = {2: "shape base\npolygon -0.5 -0.1  0.5 -0.1  0.5 0.1  -0.5 0.1\n", 3: "shape base\nbox 1.0 0.4 0.2\n"}[dimension]
+            bases = [body("base", up(dimension, -0.1, x), STILL[dimension], scale=1.0) for x in (-0.5, 0.5)]
+            if dimension == 2:
+                sheets = [{"shape": "segment", "point": [x, 0.0], "end": [x + 1.0, 0.0]} for x in (-1.0, 0.0)]
+            else:
+                sheets = [{"shape": "rectangle", "point": [x, -0.5, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0]} for x in (-1.0, 0.0)]
+            grounds = {"loose": (bases, [plane(dimension, -0.2)]), "glued": ([{**row, "group": 1} for row in bases], [{"shape": "grains", "group": 1}]),
+                       "sheets": ([], sheets)}
+            for name, (rows, walls) in grounds.items():
+                for step, friction in ((1e-3, 0.3), (4e-4, 0.3), (1e-3, 0.0)):
+                    with self.subTest(name, dimension=dimension, step=step, friction=friction):
+                        slider = body("block", up(dimension, 0.1, -0.15), STILL[dimension], [2.0] + [0.0] * (dimension - 1), scale=1.0)
+                        if name == "glued":
+                            slider["group"] = 0
+                        run = self.play(f"{name} {dimension} {step} {friction}", dimension, [slider, *rows], walls,
+                                        {"scene": {"gravity": up(dimension, -G), "friction": friction}, "time": {"step": step, "steps": round(0.06 / step)}, "output": {"every": round(0.06 / step)}},
+                                        library=BLOCK[dimension] + base)
+                        velocity = self.track(run, "velocity")[-1]
+                        np.testing.assert_allclose(velocity, [2.0 - 0.06 * friction * G] + [0.0] * (3 * dimension - 4), atol=2e-5)
+
     def test_rebound(self):
         """A block that falls flat rebounds with e times its speed and without spin. One that falls on a corner keeps its angular momentum
         about that corner, and leaves with e times the speed of the corner."""

@@ -4,7 +4,9 @@
 !> with the places. Where they overlap, it is the direction of least separation. Two sides that face each other within
 !> `facing_angle` touch in up to two points, the ends of the part that they have in common; else the pieces touch in the ends of
 !> the shortest way. Sides that are parallel reach to the sharp corners, so that a brick stands on the whole of its base; the larger
-!> the angle between them, the less they reach beyond the core, and from `blend_angle` on not at all.
+!> the angle between them, the less they reach beyond the core, and from `blend_angle` on not at all. The shortest way of sides that
+!> have a part of their cores in common is across one of them. As it turns from there, sides reach less far in the same way, and
+!> from `blend_angle` on there is a corner on a corner: bricks whose tops are flush do not meet with their sides.
 module gravier_polygon_pair
   use gravier_kinds, only: dp
   use gravier_manifold, only: manifold_t, feature_base
@@ -102,7 +104,7 @@ contains
       on_b(:) = b%vertex(:, vertex_b)
       if (side_a%facing <= side_b%facing) on_b(:) = a%vertex(:, vertex_a) - distance*normal
     end if
-    if (a%n > 1 .and. b%n > 1) call clip_sides(a, b, side_a, side_b, alert, manifold)
+    if (a%n > 1 .and. b%n > 1) call clip_sides(a, b, side_a, side_b, normal, alert, manifold)
     if (manifold%n > 0) return
     manifold%n = 1
     manifold%normal(1:2) = normal
@@ -326,17 +328,25 @@ contains
 
   !> The ends of the part that two sides have in common, where they face each other. The side that faces the other piece more, or
   !> that of a, gives the normal; keys and the order of points do not depend on which it is.
-  pure subroutine clip_sides(a, b, side_a, side_b, alert, manifold)
+  pure subroutine clip_sides(a, b, side_a, side_b, shortest, alert, manifold)
     type(placed_piece_t), intent(in) :: a, b
     type(side_t), intent(in) :: side_a, side_b
-    real(dp), intent(in) :: alert
+    !> direction of the shortest way (2)
+    real(dp), intent(in) :: shortest(2), alert
     type(manifold_t), intent(inout) :: manifold
     type(ends_t) :: points
-    real(dp) :: angle, ends_a(2, 2), ends_b(2, 2)
+    real(dp) :: angle, turned, ends_a(2, 2), ends_b(2, 2)
     integer :: k
 
     angle = abs(cross(side_a%along, side_b%along))
-    if (angle > facing_angle .or. side_a%facing < 0.5_dp .or. side_b%facing < 0.5_dp) return
+    if (angle > facing_angle) return
+    if (manifold%cores_overlap) then
+      if (side_a%facing < 0.5_dp .or. side_b%facing < 0.5_dp) return
+    else
+      turned = min(abs(sum(side_a%along*shortest)), abs(sum(side_b%along*shortest)))
+      if (turned > blend_angle) return
+      angle = max(angle, turned)
+    end if
     call blend_ends(a, side_a, angle, ends_a)
     call blend_ends(b, side_b, angle, ends_b)
     if (side_b%facing > side_a%facing) then

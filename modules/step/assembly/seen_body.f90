@@ -19,6 +19,8 @@ module gravier_seen_body
     real(dp) :: centre(3) = 0.0_dp
     !> its angle in the plane [rad], its axes in space, one a column
     real(dp) :: angle = 0.0_dp, axes(3, 3) = 0.0_dp
+    !> of its centre [m/s], and its spin [rad/s]
+    real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
   end type seen_body_t
 
 contains
@@ -35,6 +37,9 @@ contains
     do d = 1, 3
       seen%axes(d, d) = 1.0_dp
     end do
+    seen%velocity(1:bodies%nd) = bodies%velocity(1:bodies%nd, k)
+    if (bodies%nv == 3 .and. bodies%nd == 2) seen%spin(3) = bodies%velocity(3, k)
+    if (bodies%nv == 6) seen%spin(:) = bodies%velocity(4:6, k)
     if (seen%shape == 0) return
     if (bodies%nd == 2) then
       seen%angle = bodies%orientation(1, k)

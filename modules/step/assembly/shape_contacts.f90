@@ -2,17 +2,19 @@
 module gravier_shape_contacts
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t, list_faces
-  use gravier_convex_distance, only: placed_pair_t
   use gravier_shape_library, only: shape_library_t, of_face
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
-  use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
-  use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
+  use gravier_polygon_pair, only: placed_piece_t, place_piece, find_plane_manifold
+  use gravier_polyhedron_pair, only: find_halfspace_manifold
   use gravier_facet, only: near_facets_t
   use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
   use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
+  use gravier_surface_velocity, only: add_image_velocity
+  use gravier_piece_meeting, only: room_t, meet_pieces
+  use gravier_clear_path, only: clear_path
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
@@ -21,12 +23,14 @@ module gravier_shape_contacts
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
 
-  !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for two placed pieces of the plane, and for
-  !> facets.
+  !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for pieces where bodies are and where they
+  !> go, and for facets.
   type :: shape_work_t
     private
     type(convex_piece_t) :: ball
-    type(placed_piece_t) :: a, b
+    type(room_t) :: room, ahead
+    !> over which bodies go on with their velocities, 0 where these do not count [s]; points with a larger gap are no contacts [m]
+    real(dp) :: step = 0.0_dp, alert = 0.0_dp
     type(near_facets_t) :: near, turned
     type(facet_contacts_t) :: facets
   contains
@@ -35,11 +39,14 @@ module gravier_shape_contacts
 
 contains
 
-  subroutine shape_work_init(self, nd)
+  subroutine shape_work_init(self, nd, step)
     class(shape_work_t), intent(inout) :: self
     !> 2 or 3
     integer, intent(in) :: nd
+    !> [s]; 0 where only the places count
+    real(dp), intent(in) :: step
 
+    self%step = step
     self%ball%rounding = 1.0_dp
     if (allocated(self%ball%vertex)) deallocate (self%ball%vertex, self%ball%corner, self%ball%face_first, &
       & self%ball%neighbour_first, self%ball%face_vertex, self%ball%neighbour, self%ball%face_normal)
@@ -64,6 +71,7 @@ contains
 
     points%n = 0
     points%way(:) = 0.0_dp
+    work%alert = decomposition%rule%alert_distance
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
@@ -75,7 +83,8 @@ contains
         call see_body(bodies, j, antagonist)
         antagonist%centre(1:decomposition%nd) = way
         points%way(:) = antagonist%centre
-        call touch_body(decomposition%shapes, candidate, antagonist, decomposition%nd, alert, work, points)
+        if (view%period%moves) call add_image_velocity(view, p, antagonist%velocity(1:decomposition%nd))
+        call touch_body(decomposition%shapes, candidate, antagonist, work, points)
       else
         call see_body(bodies, i, candidate)
         call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, work, &
@@ -87,68 +96,55 @@ contains
   end subroutine find_points
 
   !> The points of two bodies, piece by piece.
-  subroutine touch_body(shapes, a, b, nd, alert, work, points)
+  subroutine touch_body(shapes, a, b, work, points)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: a, b
-    integer, intent(in) :: nd
-    !> [m]
-    real(dp), intent(in) :: alert
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
-    type(manifold_t) :: manifold
-    integer :: k, l
+    integer :: k, number(2)
 
-    do k = 1, n_pieces(shapes, a)
-      if (nd == 2) call place(shapes, work%ball, a, k, work%a)
-      do l = 1, n_pieces(shapes, b)
-        if (nd == 2) then
-          call place(shapes, work%ball, b, l, work%b)
-          call find_polygon_manifold(work%a, work%b, alert, manifold)
-        else if (a%shape == 0) then
-          call meet(work%ball, b)
-        else
-          call meet(shapes%shape(a%shape)%piece(k), b)
-        end if
-        call points%add(manifold, k, l)
+    number(:) = 1
+    if (a%shape == 0) then
+      call touch(work%ball)
+    else
+      do k = 1, size(shapes%shape(a%shape)%piece)
+        number(1) = k
+        call touch(shapes%shape(a%shape)%piece(k))
       end do
-    end do
+    end if
 
   contains
 
-    !> Piece l of body b meets a piece of body a in space.
-    subroutine meet(piece, b)
+    subroutine touch(piece)
       type(convex_piece_t), intent(in) :: piece
-      type(seen_body_t), intent(in) :: b
+      integer :: l
 
       if (b%shape == 0) then
-        call meet_in_space(piece, work%ball, a, b, alert, manifold)
+        call touch_piece(piece, work%ball, a, b, number, work, points)
       else
-        call meet_in_space(piece, shapes%shape(b%shape)%piece(l), a, b, alert, manifold)
+        do l = 1, size(shapes%shape(b%shape)%piece)
+          number(2) = l
+          call touch_piece(piece, shapes%shape(b%shape)%piece(l), a, b, number, work, points)
+        end do
       end if
-    end subroutine meet
+    end subroutine touch
 
   end subroutine touch_body
 
-  !> The points of a piece of body a and one of body b in space, in global axes.
-  subroutine meet_in_space(piece_a, piece_b, a, b, alert, manifold)
+  !> The points of two pieces, with the gaps of those that go past each other widened.
+  subroutine touch_piece(piece_a, piece_b, a, b, number, work, points)
     type(convex_piece_t), intent(in) :: piece_a, piece_b
     type(seen_body_t), intent(in) :: a, b
-    real(dp), intent(in) :: alert
-    type(manifold_t), intent(inout) :: manifold
-    type(placed_pair_t) :: pair
-    integer :: k, l
+    !> of each piece
+    integer, intent(in) :: number(2)
+    type(shape_work_t), intent(inout) :: work
+    type(pair_points_t), intent(inout) :: points
+    type(manifold_t) :: manifold
 
-    pair%radius_a = a%radius
-    pair%radius_b = b%radius
-    do k = 1, 3
-      pair%way(k) = sum(a%axes(:, k)*b%centre)
-      do l = 1, 3
-        pair%rotation(k, l) = sum(a%axes(:, k)*b%axes(:, l))
-      end do
-    end do
-    call find_polyhedron_manifold(piece_a, piece_b, pair, alert, of_face, manifold)
-    call turn_manifold(a%axes, manifold)
-  end subroutine meet_in_space
+    call meet_pieces(piece_a, piece_b, a, b, work%alert, work%room, manifold)
+    if (work%step > 0.0_dp) call clear_path(piece_a, piece_b, work%step, a, b, work%ahead, manifold)
+    call points%add(manifold, number(1), number(2))
+  end subroutine touch_piece
 
   !> The points with a boundary: a plane, a surface that ends at straight edges, one that is round, or one of facets.
   subroutine touch_boundary(shapes, a, centre, boundary, alert, work, points)
@@ -162,7 +158,7 @@ contains
     type(pair_points_t), intent(inout) :: points
     type(convex_piece_t) :: sheet
     type(seen_body_t) :: seen_sheet
-    real(dp) :: normal(size(centre)), distance, corners(3, 4)
+    real(dp) :: normal(size(centre)), place(size(centre)), distance, corners(3, 4)
     integer :: k, n
 
     if (.not. boundary%present) return
@@ -181,7 +177,12 @@ contains
     call boundary%locate(centre, distance, normal)
     if (distance - a%radius > alert) return
     call boundary%find_corners(centre, n, corners)
-    if (n > 0) call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
+    if (n > 0) then
+      call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
+      place(:) = centre + seen_sheet%centre(1:size(centre))
+      call boundary%last_velocity_at(place, seen_sheet%velocity(1:size(centre)))
+      seen_sheet%spin(:) = boundary%last_spin
+    end if
     do k = 1, n_pieces(shapes, a)
       if (a%shape == 0) then
         call touch(work%ball)
@@ -195,13 +196,15 @@ contains
     subroutine touch(piece)
       type(convex_piece_t), intent(in) :: piece
       type(manifold_t) :: manifold
+      integer :: number(2)
 
       if (boundary%is_plane()) then
-        call touch_plane(piece, a, normal, distance, alert, work%a, manifold)
+        call touch_plane(piece, a, normal, distance, alert, work%room%a, manifold)
         call points%add(manifold, k, 1)
       else if (n > 0) then
-        call touch_sheet(piece, a, sheet, seen_sheet, size(centre), alert, manifold)
-        call points%add(manifold, k, 1)
+        number(1) = k
+        number(2) = 1
+        call touch_piece(piece, sheet, a, seen_sheet, number, work, points)
       else
         call touch_round_surface(piece, a, centre, boundary, alert, k, points)
       end if
@@ -225,8 +228,8 @@ contains
       call turn_vertex(piece%vertex(:, 1), a, centre)
       call find_ball_contacts(centre, a%radius*piece%rounding, work%near, alert, work%facets)
     else if (nd == 2) then
-      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), work%a)
-      call find_polygon_contacts(work%a, work%near, alert, work%facets)
+      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), work%room%a)
+      call find_polygon_contacts(work%room%a, work%near, alert, work%facets)
     else
       call turn_facets(a%axes, work%near, work%turned)
       call find_polyhedron_contacts(piece, a%radius, work%turned, alert, of_face, work%facets)
@@ -259,24 +262,6 @@ contains
     call find_halfspace_manifold(piece, a%radius, turned, distance, alert, of_face, manifold)
     call turn_manifold(a%axes, manifold)
   end subroutine touch_plane
-
-  !> The points with a surface that ends at straight edges, which has no thickness.
-  subroutine touch_sheet(piece, a, sheet, seen_sheet, nd, alert, manifold)
-    type(convex_piece_t), intent(in) :: piece, sheet
-    type(seen_body_t), intent(in) :: a, seen_sheet
-    integer, intent(in) :: nd
-    real(dp), intent(in) :: alert
-    type(manifold_t), intent(inout) :: manifold
-    type(placed_piece_t) :: placed, placed_sheet
-
-    if (nd == 2) then
-      call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
-      call place_piece(sheet%vertex, sheet%corner, 0.0_dp, seen_sheet%radius, 0.0_dp, seen_sheet%centre(1:2), placed_sheet)
-      call find_polygon_manifold(placed, placed_sheet, alert, manifold)
-    else
-      call meet_in_space(piece, sheet, a, seen_sheet, alert, manifold)
-    end if
-  end subroutine touch_sheet
 
   !> The points with a round surface: vertices, of a polygon the nearest and the nearer of those beside it.
   subroutine touch_round_surface(piece, a, centre, boundary, alert, number, points)
@@ -384,22 +369,5 @@ contains
     end function across
 
   end subroutine make_sheet
-
-  !> Put piece `k` of a body of the plane in its place.
-  subroutine place(shapes, ball, seen, k, placed)
-    type(shape_library_t), intent(in) :: shapes
-    type(convex_piece_t), intent(in) :: ball
-    type(seen_body_t), intent(in) :: seen
-    integer, intent(in) :: k
-    type(placed_piece_t), intent(inout) :: placed
-
-    if (seen%shape == 0) then
-      call place_piece(ball%vertex, ball%corner, 1.0_dp, seen%radius, 0.0_dp, seen%centre(1:2), placed)
-    else
-      associate (this => shapes%shape(seen%shape)%piece(k))
-        call place_piece(this%vertex, this%corner, this%rounding, seen%radius, seen%angle, seen%centre(1:2), placed)
-      end associate
-    end if
-  end subroutine place
 
 end module gravier_shape_contacts

@@ -10,6 +10,10 @@ program test_shape_contacts
   use gravier_halo, only: local_bodies_t
   use gravier_pair_points, only: pair_points_t
   use gravier_shape_contacts, only: shape_work_t, find_points
+  use gravier_manifold, only: manifold_t
+  use gravier_seen_body, only: seen_body_t, see_body
+  use gravier_piece_meeting, only: room_t, meet_pieces
+  use gravier_clear_path, only: clear_path
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
@@ -29,6 +33,8 @@ program test_shape_contacts
   call test_plane(2)
   call test_plane(3)
   call test_period()
+  call test_passing(2)
+  call test_passing(3)
   call test_contacts(2)
   call test_contacts(3)
   call finish_checks()
@@ -86,7 +92,7 @@ contains
     order(1:places) = 1
     order(places + 1:) = 2
     call view%list%finish(order, memory)
-    call work%init(nd)
+    call work%init(nd, 0.0_dp)
   end subroutine make
 
   !> A code of a shift, 0 where there is none.
@@ -130,6 +136,59 @@ contains
     call find_points(view, decomposition, 1, work, points)
     call check_equal(points%n, 0, "boxes whose balls do not touch")
   end subroutine test_boxes
+
+  !> A box whose lower side is flush with the upper side of the other slides towards it: they do not meet, and the contact of their
+  !> corners leaves the velocity free. A box that is lower strikes the side; one that is so fast that it is behind the other at the
+  !> end of the step does, too.
+  subroutine test_passing(nd)
+    integer, intent(in) :: nd
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    type(shape_work_t) :: work
+    type(manifold_t) :: seen, cleared
+    real(dp), parameter :: h = 0.1_dp
+    real(dp) :: place(nd)
+
+    place(:) = 0.0_dp
+    place(1) = 2.0_dp + 0.5_dp*gap
+    place(nd) = -2.0_dp
+    call make(nd, [1, 1], place, room, view, decomposition, work)
+    view%bodies%velocity(:, :) = 0.0_dp
+    view%bodies%velocity(1, 1) = 2.0_dp*gap/h
+    call go_on(view, decomposition, h, seen, cleared)
+    call check_equal(seen%n, merge(1, 2, nd == 2), "corners or edges that face each other")
+    call check(seen%normal(1) < -0.3_dp .and. seen%normal(nd) > 0.3_dp, "obliquely")
+    call check(cleared%gap(1) > seen%gap(1), "boxes go past each other")
+    call check_close(minval(cleared%gap(1:seen%n)), -2.0_dp*gap*seen%normal(1), tight, "with the velocity that they have")
+    view%bodies%position(nd, 2) = place(nd) + 0.1_dp*gap
+    call go_on(view, decomposition, h, seen, cleared)
+    call check(seen%n > 0, "a box that is lower")
+    call check_close(cleared%gap(1), seen%gap(1), 0.0_dp, "it strikes the other")
+    view%bodies%velocity(1, 1) = 20.0_dp/h
+    view%bodies%position(nd, 2) = place(nd) + 0.5_dp
+    call go_on(view, decomposition, h, seen, cleared)
+    call check(seen%n > 0, "a box that strikes the side")
+    call check_close(cleared%gap(1), seen%gap(1), 0.0_dp, "however fast it is")
+  end subroutine test_passing
+
+  !> The points of the two bodies, and with their paths looked at.
+  subroutine go_on(view, decomposition, h, seen, cleared)
+    type(local_bodies_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    real(dp), intent(in) :: h
+    type(manifold_t), intent(out) :: seen, cleared
+    type(seen_body_t) :: a, b
+    type(room_t) :: places
+
+    call see_body(view%bodies, 1, a)
+    call see_body(view%bodies, 2, b)
+    b%centre(1:decomposition%nd) = view%bodies%position(:, 2)
+    associate (piece => decomposition%shapes%shape(1)%piece(1))
+      call meet_pieces(piece, piece, a, b, alert, places, seen)
+      cleared = seen
+      call clear_path(piece, piece, h, a, b, places, cleared)
+    end associate
+  end subroutine go_on
 
   !> A pair with fewer places in the list keeps the deepest points: a box that leans.
   subroutine test_few_places()
