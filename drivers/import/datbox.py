@@ -40,14 +40,22 @@ class Body:
         place = self.node.vector("coo", self.dimension)
         return place + self.initial.vector("X", self.dimension) if self.initial else place
 
-    def velocity(self):
-        """Translation, then spin about the axes of space."""
+    def centre(self, beside):
+        """Where the centre of mass is, `beside` the node in the axes of BODIES.DAT. LMGC90 shifts the node of a body with one contactor by it,
+        without a turn, so that DOF.INI turns and moves the body about it. The node of a body with several contactors stays where it is."""
+        return self.place() + (beside if len(self.contactors) == 1 else self.frame() @ beside)
+
+    def velocity(self, beside=None):
+        """Translation of the centre of mass `beside` the node, or of the node, then spin about the axes of space."""
         d = self.dimension
         if self.initial is None:
             return np.zeros(3 * d - 3)
         velocity = self.initial.vector("V", 3 * d - 3)
         if d == 3:
             velocity[3:] = self.frame() @ velocity[3:]
+        if beside is not None and len(self.contactors) > 1:
+            arm = self.frame() @ beside
+            velocity[:d] += np.cross(velocity[3:], arm) if d == 3 else velocity[2] * np.array([-arm[1], arm[0]])
         return velocity
 
 

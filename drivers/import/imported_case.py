@@ -65,12 +65,12 @@ class Case:
         self.check_mass(body, shape)
         frame = body.frame()
         name = self.shapes.setdefault(shape.text(), f"{things[0][0]}_{len(self.shapes) + 1}")
-        velocity = body.velocity() if group == 0 else None
+        velocity = body.velocity(shape.centre) if group == 0 else None
         if things[0][0] == "JONCx":
             self.remarks.append(f"body {body.rank} JONCx: nothing drives it, it moves freely")
         if any(piece.kind in HULLS for piece in shape.pieces):
             self.remarks.append(f"corners and edges of polygons and polyhedra are round here, with at most {ROUNDING:g} of their size")
-        self.keep(body, Grain(body.rank, body.place() + frame @ shape.centre, 0.0, self.bulks.mass(body, shape.volume),
+        self.keep(body, Grain(body.rank, body.centre(shape.centre), 0.0, self.bulks.mass(body, shape.volume),
                               self.laws.material(things[0]), velocity, group, name, turn_of(frame)))
 
     def check_mass(self, body, shape):

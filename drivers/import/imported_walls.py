@@ -1,6 +1,7 @@
 """Walls of a DATBOX as boundaries: their surfaces, and the motion that drives prescribe."""
 import numpy as np
-from datbox import ROUND
+from body_shapes import ShapeOfBody
+from datbox import HULLS, ROUND
 from datbox_drives import Function
 from imported_grain import Grain
 
@@ -43,7 +44,7 @@ def motion(case, body, whole):
     if np.any(spin != 0.0):
         keys["rotation"] = list(spin)
     if np.any(spin != 0.0) or any(name in columns for name in names[d:]):
-        keys["pivot"] = list(body.place())
+        keys["pivot"] = list(body.centre(ShapeOfBody(body).centre) if body.contactors[0].words[0] in HULLS else body.place())
     if any(free):
         keys.update(free=free, mass=mass)
         if np.any(force != 0.0):

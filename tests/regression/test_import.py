@@ -321,14 +321,32 @@ class Import(RunTestCase):
         self.assertIn("body 1: its place is the centre of mass of its contactors", notes)
         steps, _ = self.run_case(folder)
         first, last = steps[0], steps[-1]
-        c, s = math.cos(0.5), math.sin(0.5)
-        centre = np.array([[0.2 * c - 0.1 * s, 1.0 + 0.2 * s + 0.1 * c], [2.0 + (0.03 * 0.15 + 0.01 * 0.05) / 0.04, 1.0 + (0.03 * 0.05 + 0.01 * 0.15) / 0.04],
+        # the node of a body with one contactor is shifted before it is turned
+        centre = np.array([[0.2, 1.1], [2.0 + (0.03 * 0.15 + 0.01 * 0.05) / 0.04, 1.0 + (0.03 * 0.05 + 0.01 * 0.15) / 0.04],
                            [4.0, 1.0]])
         np.testing.assert_allclose(first["position"][:3], centre, atol=1e-9)
         np.testing.assert_allclose(first["orientation"][:3, 0], [0.5, 0.0, 0.3], atol=1e-9)
         np.testing.assert_allclose(first["mass"][:3], 2500.0 * np.array([0.09, 0.04, 0.04]), rtol=1e-9)
         np.testing.assert_allclose(last["orientation"][2, 0], 0.3 + 3.0 * 0.02, atol=1e-9)
         np.testing.assert_allclose(last["position"][2], [4.0 + 0.02, 1.0 + 2.0 * 0.02 - 0.5 * G * 0.02**2], atol=1e-6)
+
+    def test_state_of_bodies_whose_node_is_not_their_centre(self):
+        """DOF.INI moves and turns a body with one contactor about its centre of mass, to which LMGC90 shifts the node, and one with several about
+        its node, whose velocity is not that of the centre. They fly on as they are: the corner that stands where DOF.INI says has the velocity of a rigid body."""
+        wedge = [(0.0, 0.0), (0.6, 0.0), (0.0, 0.3)]
+        ell = [polyg([(0.0, 0.0), (0.3, 0.0), (0.3, 0.1), (0.0, 0.1)]), polyg([(0.0, 0.1), (0.1, 0.1), (0.1, 0.2), (0.0, 0.2)])]
+        bodies = body(2, 1, [0.0, 1.0, 0.2], [polyg(wedge)]) + body(2, 2, [2.0, 1.0], ell) + \
+            body(2, 3, [0.0, -1.0], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "POLYG", "BLUEx", "POLYG", "BLUEx") + SEE.format("RBDY2", "POLYG", "BLUEx", "JONCx", "WALLx")
+        states = state(2, 1, [0.01, 0.02, 0.3], [1.0, 0.0, 2.0]) + state(2, 2, [0.01, 0.02, 0.3], [1.0, 0.0, 2.0])
+        folder, _ = self.convert(self.box(2, bodies, laws, still(2, 3), states), steps=1)
+        steps, _ = self.run_case(folder)
+        arm = np.array([(0.03 * 0.15 + 0.01 * 0.05) / 0.04, (0.03 * 0.05 + 0.01 * 0.15) / 0.04])
+        c, s = math.cos(0.3), math.sin(0.3)
+        arm = np.array([c * arm[0] - s * arm[1], s * arm[0] + c * arm[1]])
+        np.testing.assert_allclose(steps[0]["position"][:2], [[0.2 + 0.01, 1.1 + 0.02], [2.01 + arm[0], 1.02 + arm[1]]], atol=1e-9)
+        np.testing.assert_allclose(steps[0]["orientation"][:2, 0], [0.5, 0.3], atol=1e-9)
+        np.testing.assert_allclose(steps[0]["velocity"][:2], [[1.0, 0.0, 2.0], [1.0 - 2.0 * arm[1], 2.0 * arm[0], 2.0]], atol=1e-9)
 
     def test_disks_in_one_body(self):
         """Two disks and a free JONCx on a ground: a dumb-bell keeps its length and comes to rest on both disks, a stadium on its side."""
