@@ -101,11 +101,24 @@ contains
 
   end function strain_reason
 
-  !> Whether the scene rests and no grains are to enter, in a run that ends by that.
+  !> Whether the scene rests, and nothing that could move it comes or came in the last steps: no grains, no boundary that goes, no
+  !> change of gravity or of what moves a boundary.
   pure logical function rests(simulation)
     type(simulation_t), intent(in) :: simulation
+    real(dp) :: since
+    integer :: b
+
     rests = simulation%rest_energy > 0.0_dp .and. simulation%quiet >= steps_at_rest
-    if (rests) rests = .not. simulation%inflow%awaits(simulation%time)
+    if (.not. rests) return
+    since = (simulation%step - steps_at_rest)*simulation%physics%h
+    rests = .not. simulation%inflow%awaits(simulation%time)
+    if (allocated(simulation%gravity_table%has)) rests = rests .and. .not. simulation%gravity_table%changes_after(since)
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(b))
+        rests = rests .and. .not. (boundary%remove_at > since .and. boundary%remove_at < huge(1.0_dp))
+        if (allocated(boundary%table%has)) rests = rests .and. .not. boundary%table%changes_after(since)
+      end associate
+    end do
   end function rests
 
   !> How far the boundary of stop_boundary is from its place at the start of the scene [m].

@@ -53,6 +53,29 @@ class AtRest(RunTestCase):
         self.assertIn(f"at rest     after step {count} of {STEPS}", self.straight.stdout)
         self.assertRegex(self.straight.stdout.rstrip().splitlines()[-1], f"^finished    all {count} steps reached the accuracy")
 
+    def test_what_is_to_come(self):
+        """Grains that rest do not end a run before a gate opens, gravity turns or a belt starts, nor in the ten steps behind that."""
+        files = {"gravity.csv": "time,gx,gy\n0,0,-9.81\n0.1,0,-9.81\n0.2,5,-9.81\n", "belt.csv": "time,vx\n0,0\n0.1,0\n0.2,0.5\n"}
+        floor = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+        ground = {"shape": "plane", "point": [0.0, -0.2], "normal": [0.0, 1.0]}
+        for name, boundaries, scene, moved in (("gate", [{**floor, "remove_at": 0.1}, ground], {}, lambda place: place[1] < -0.15),
+                                               ("gravity", [floor], {"gravity_table": "gravity.csv"}, lambda place: place[0] > 0.01),
+                                               ("belt", [{**floor, "table": "belt.csv"}], {}, lambda place: place[0] > 0.01),
+                                               ("nothing", [floor], {}, lambda place: abs(place[0]) < 1e-6)):
+            with self.subTest(name):
+                place = self.here(name)
+                os.makedirs(place)
+                for path, text in {**files, "ball.csv": "id,x,y,radius\n1,0,0.01,0.01\n"}.items():
+                    write(os.path.join(place, path), text)
+                run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "ball.csv", "friction": 0.4, "rotation": False, **scene},
+                                "boundary": boundaries, "time": {"step": 1e-3, "steps": 600, "rest_energy": LOW}, "output": {"every": 0}}, directory=place)
+                self.assert_status(run, 0)
+                steps = len(run.history()["step"])
+                self.assertEqual(steps, 10) if name == "nothing" else self.assertGreater(steps, 200)
+                results = run.results()
+                last = max(int(key.split("/")[2]) for key in results if key.endswith("/bodies/position"))
+                self.assertTrue(moved(results[f"/steps/{last}/bodies/position"][0]), results[f"/steps/{last}/bodies/position"])
+
     def test_a_ball_at_its_apex_is_not_at_rest(self):
         """It is slow for some steps of each bounce, which do not add up."""
         place = self.here("ball")

@@ -243,6 +243,15 @@ class Shapes(SmallScene):
                 self.verify(f"{title}, direction of length {length}", "place of a grain [m]", record.position, wanted, 1e-14)
             self.assertGreater(np.abs(wanted[-1] - wanted[0]).max(), 0.04)
 
+    def test_removal_at_times_in_decimals(self):
+        """A boundary goes in the first step that begins at its time, also where the time of the step is smaller by rounding: 57 steps of 3e-4 s."""
+        for step, count in ((3e-4, 57), (3e-4, 301), (6e-4, 57), (1e-3, 57)):
+            self.step = step
+            record = self.play(f"gone after {count} of {step}", [Grain((0.0, RADIUS), radius=RADIUS)], [plane((0, 0), (0, 1), remove_at=round(count * step, 7))],
+                               (0.0, -G), count + 3, output={"every": 1})
+            self.verify("a plane that is removed", f"speed after {count} steps of {step} s [m/s]", record.velocity[:, 0, 1],
+                        -G * step * np.maximum(record.step - count, 0), 1e-12)
+
     def test_removal(self):
         """A ball at rest falls from the time on when its ground is taken away."""
         def check(dimension):

@@ -20,6 +20,7 @@ module gravier_time_table
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
+    procedure :: changes_after => time_table_changes_after
     procedure :: digest => time_table_digest
   end type time_table_t
 
@@ -167,6 +168,23 @@ contains
       value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
     end if
   end function time_table_at
+
+  !> Whether some quantity has another value later than it has at a time. The table has been read.
+  pure logical function time_table_changes_after(self, time) result(changes)
+    class(time_table_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: row, k
+
+    changes = .false.
+    do k = 1, size(self%has)
+      if (.not. self%has(k)) cycle
+      do row = size(self%time), 1, -1
+        if (.not. self%time(row) > time) exit
+        changes = changes .or. abs(self%value(k, row) - self%at(k, time)) > 0.0_dp
+      end do
+    end do
+  end function time_table_changes_after
 
   !> A number that tells tables of other columns, times or values apart; the table has been read.
   pure integer(i8) function time_table_digest(self) result(digest)

@@ -14,6 +14,9 @@ module gravier_body_motion
   private
   public :: move_to_middle, drive, count_fast, move_to_end
 
+  !> part of a step by which times that are written in decimals are before those of steps
+  real(dp), parameter :: rounded = 1.0e-6_dp
+
 contains
 
   !> q_m of grains and boundaries; boundaries whose time has come are taken away.
@@ -46,7 +49,7 @@ contains
     do b = 1, size(decomposition%boundaries)
       associate (boundary => decomposition%boundaries(b))
         call boundary%move(part)
-        if (.not. boundary%present .or. time < boundary%remove_at) cycle
+        if (.not. boundary%present .or. time + rounded*physics%h < boundary%remove_at) cycle
         boundary%present = .false.
         taken_away = .true.
       end associate

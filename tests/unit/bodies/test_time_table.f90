@@ -53,6 +53,10 @@ contains
     call check_close(table%at(3, 3.5_dp), 12.0_dp, 0.0_dp, "at the last row")
     call check_close(table%at(3, 1.0e9_dp), 12.0_dp, 0.0_dp, "after the last row")
     call check_close(table%at(1, 2.0_dp), -1.0_dp, 0.0_dp, "a constant stretch of another column")
+    call check(table%changes_after(-1.0_dp) .and. table%changes_after(3.4_dp), "it changes before the last row")
+    call check(.not. table%changes_after(3.5_dp), "and not behind it")
+    call read_table("vx,time"//newline//"8,1"//newline//"8,3"//newline, error)
+    call check(.not. table%changes_after(0.0_dp), "equal rows are no change")
   end subroutine test_values
 
   subroutine test_one_row()
