@@ -32,6 +32,9 @@ module gravier_contact_packing
     type(contact_terms_t) :: terms
   end type packed_t
 
+  !> gap over the radius of the candidate that is rounding
+  real(dp), parameter :: rounded_gap = 1.0e-9_dp
+
 contains
 
   !> Pack the contacts in the order in which they are swept, with the columns of boundaries that turn: first normals, levers and
@@ -255,8 +258,8 @@ contains
       sub%hot(q, row%shift, g) = terms%free_gap/h
       if (allocated(sub%attraction)) then
         sub%attraction(q, g) = h*terms%attraction
-        ! what touches starts as if its attraction did nothing: the bodies press against each other by as much
-        if (.not. terms%free_gap > 0.0_dp) sub%impulse(q, 1, g) = h*terms%attraction
+        ! what touches, but for rounding, starts as if its attraction did nothing: the bodies press against each other by as much
+        if (.not. terms%free_gap > rounded_gap*view%bodies%radius(i)) sub%impulse(q, 1, g) = h*terms%attraction
       end if
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction

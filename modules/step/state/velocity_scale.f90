@@ -14,9 +14,9 @@
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
 !>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else
 !>            stress; f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
-!> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other. Attractions balance
-!> each other inside of bodies, and say as little of what moves as the strength of a wall: where they alone are the load, U_q is
-!> min(load, creep).
+!> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other. Bonds, and
+!> attractions that would bring grains together from the end of their range in one step, balance each other inside of bodies, and
+!> say as little of what moves as the strength of a wall: where they alone are the load, U_q is min(load, creep).
 module gravier_velocity_scale
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
@@ -73,7 +73,7 @@ module gravier_velocity_scale
     real(dp) :: duration = 0.0_dp
     !> largest coefficient of restitution of the laws
     real(dp) :: restitution = 0.0_dp
-    !> the load is that of attractions, in the place of another one
+    !> the load is that of attractions, in the place of another one, and holds bodies together
     logical :: internal = .false.
     !> what the mean attraction of a bond that may break for good gives to the mean grain in a step; 0 without bonds [m/s]
     real(dp) :: bonds = 0.0_dp
@@ -165,8 +165,10 @@ contains
     if (sums(2) > 0.0_dp .and. self%mass > 0.0_dp) attraction = sqrt(sums(1)/sums(2))/self%mass
     self%bonds = merge(attraction, 0.0_dp, physics%laws%breaks)
     ! attractions hold bodies together and move none of them but where there is no other load
-    self%internal = .not. self%load > 0.0_dp .and. attraction > 0.0_dp
-    if (self%internal) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
+    if (self%load > 0.0_dp) attraction = 0.0_dp
+    self%internal = attraction > 0.0_dp .and. (physics%laws%breaks .or. &
+      & (physics%laws%range > 0.0_dp .and. physics%h*attraction > physics%laws%range))
+    if (attraction > 0.0_dp) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
     self%stress = 0.0_dp
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%own = 0.0_dp

@@ -262,6 +262,11 @@ contains
     scene%motion = 1.0_dp
     call assemble(comm, scene, sim)
     call check_scale(sim, 0.3_dp*sim%velocity_scale%own, "motion of the bodies", "attraction of bodies that move")
+    ! the range is crossed in a step with 0.125 m/s
+    scene%motion = 0.0_dp
+    scene%adhesion = 0.1_dp*mass/step
+    call assemble(comm, scene, sim)
+    call check_scale(sim, 0.1_dp, "load of a step", "attraction that brings grains together in several steps")
     scene%motion = 0.0_dp
     scene%adhesion = 0.5_dp*creep*mass/step
     call assemble(comm, scene, sim)

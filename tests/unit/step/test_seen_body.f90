@@ -25,6 +25,8 @@ contains
     bodies%nd = nd
     bodies%no = no
     bodies%n = 1
+    bodies%nv = 3*nd - 3
+    allocate (bodies%velocity(bodies%nv, 1), source=0.0_dp)
     allocate (bodies%radius(1), source=2.0_dp)
     allocate (bodies%shape(merge(1, 0, no > 0)), source=3)
     allocate (bodies%orientation(no, merge(1, 0, no > 0)), source=0.5_dp)
@@ -40,7 +42,11 @@ contains
 
     call make_body(3, 4, bodies)
     bodies%orientation(:, 1) = third
+    bodies%velocity(:, :) = 7.0_dp
+    bodies%velocity(4, 1) = 5.0_dp
     call see_body(bodies, 1, seen)
+    call check_close(seen%velocity(3), 7.0_dp, 0.0_dp, "the velocity")
+    call check_close(seen%spin(1), 5.0_dp, 0.0_dp, "the spin")
     call check_equal(seen%shape, 3, "the shape")
     call check_close(seen%radius, 2.0_dp, 0.0_dp, "the radius")
     call turn_vertex([1.0_dp, 0.0_dp, 0.0_dp], seen, vertex)
@@ -69,7 +75,9 @@ contains
 
     call make_body(2, 1, bodies)
     bodies%orientation(1, 1) = 2.0_dp*atan(1.0_dp)
+    bodies%velocity(3, 1) = 5.0_dp
     call see_body(bodies, 1, seen)
+    call check_close(seen%spin(3), 5.0_dp, 0.0_dp, "the spin in the plane")
     call turn_vertex([1.0_dp, 0.0_dp], seen, vertex)
     call check_close(vertex(2), 2.0_dp, 1.0e-15_dp, "a quarter of a turn")
     call check_close(abs(vertex(1)) + abs(vertex(3)), 0.0_dp, 1.0e-15_dp, "in the plane")
