@@ -43,12 +43,14 @@ contains
     j = view%list%antagonist(p)
     t = 0.5_dp*physics%h
     if (size(view%bodies%orientation, 1) > 0) then
+      ! bodies with shapes: each turns about its centre, as its arm does
       call find_spin(view, boundaries, j, spin)
       call find_circling(spin, place%arm_j, t, change)
       call find_spin(view, boundaries, i, spin)
       call find_circling(spin, place%arm_i, t, part)
       change(:) = change - part
     else
+      ! disks and spheres, which may roll on each other: the line between their centres turns, or that to the boundary with it
       if (j > 0) then
         call find_spin_of_branch(view, boundaries, physics, p, place, spin)
       else
