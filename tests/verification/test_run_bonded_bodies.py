@@ -72,6 +72,29 @@ class Turning(SmallScene):
             record, stretch = self.turn(f"theta {theta}", lattice(2, 0.0), (0, 0, 1), 1e4 * MASS, 400, time={"theta": theta})
             self.verify(f"theta {theta}", "change of distances", stretch, 0.0, 2e-4)
 
+    def test_spheres_that_gear(self):
+        """Unequal spheres of a cubic lattice roll on each other as it turns, at tight accuracies: their bonds do not contradict each other, and
+        hold, though they bear a tenth of their strength. They broke one after the other."""
+        places = 2.2 * RADIUS * np.array([(i, j, k) for k in range(2) for j in range(2) for i in range(3)], dtype=float)
+        rng = np.random.default_rng(3)
+        places += rng.uniform(-0.02 * RADIUS, 0.02 * RADIUS, places.shape)
+        places -= places.mean(axis=0)
+        radii = rng.uniform(0.85 * RADIUS, RADIUS, len(places))
+        spin = RATE * np.array([3.0, 2.0, -1.0]) / 14**0.5
+        grains = [Grain(place, np.cross(spin, place), spin, radius=radius, mass=MASS * (radius / RADIUS)**3) for place, radius in zip(places, radii)]
+        near = [(i, j) for i in range(12) for j in range(i) if np.linalg.norm(places[i] - places[j]) < 2.6 * RADIUS]
+        self.assertEqual(len(near), 20)
+        for accuracy in (0.1, 1e-3, 1e-4):
+            record = self.play(f"gearing {accuracy}", grains, [], None, 300, material=named("a"), output={"every": 30},
+                               law=[law("a", "bonded", bond_strength=200.0 * MASS, bond_friction=1.0, bond_distance=0.6 * RADIUS)],
+                               solver={**DEFAULTS, "accuracy": accuracy})
+            mass = np.array([grain.mass for grain in grains])[:, None]
+            inertia = 0.4 * mass * radii[:, None]**2
+            energy = (mass * record.velocity**2).sum(axis=(1, 2)) + (inertia * record.spin**2).sum(axis=(1, 2))
+            self.verify("spheres that gear", f"change of energy, accuracy {accuracy}", energy[-1] / energy[1], 1.0, 2e-3)
+            stretch = [np.linalg.norm(record.position[-1, i] - record.position[-1, j]) / np.linalg.norm(places[i] - places[j]) - 1.0 for i, j in near]
+            self.verify("spheres that gear", f"change of distances, accuracy {accuracy}", stretch, 0.0, 5e-3)
+
     def test_subdomains_and_methods(self):
         """The same in subdomains, on two ranks, by the other methods."""
         for method in ("nscdd", "schwarz_ec", "newton"):

@@ -25,7 +25,7 @@ module gravier_bond_turning
 contains
 
   !> The velocity of an intact bond at the end of a step, candidate less antagonist.
-  pure subroutine find_bond_velocity(view, boundaries, physics, p, place, velocity)
+  pure subroutine find_bond_velocity(view, boundaries, physics, p, place, velocity, common)
     type(local_bodies_t), intent(in) :: view
     type(boundary_t), intent(in) :: boundaries(:)
     type(physics_t), intent(in) :: physics
@@ -35,6 +35,8 @@ contains
     type(contact_place_t), intent(in) :: place
     !> (nd) [m/s]
     real(dp), intent(out) :: velocity(:)
+    !> spin with which both bodies turn as one, where it is known [rad/s]
+    real(dp), intent(in), optional :: common(3)
     real(dp) :: t, spin(3), arm(3), part(3), change(3)
     integer :: i, j, nd
 
@@ -42,7 +44,10 @@ contains
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
     t = 0.5_dp*physics%h
-    if (size(view%bodies%orientation, 1) > 0) then
+    if (present(common)) then
+      arm(:) = place%arm_j - place%arm_i
+      call find_circling(common, arm, t, change)
+    else if (size(view%bodies%orientation, 1) > 0) then
       ! bodies with shapes: each turns about its centre, as its arm does
       call find_spin(view, boundaries, j, spin)
       call find_circling(spin, place%arm_j, t, change)

@@ -16,7 +16,7 @@ module gravier_clear_path
   !> cosine of the angle by which the normal has to turn for a path to be looked at: 0.02 rad
   real(dp), parameter :: turned = 0.9998_dp
   !> overlap on the way that is none, over the roundings of both pieces, and over the radii of both bodies where that is less
-  real(dp), parameter :: touching = 0.02_dp, small = 2.0e-5_dp
+  real(dp), parameter :: touching = 0.1_dp, small = 1.0e-4_dp
   !> halvings of the path: a way of a thousand roundings is known to `touching` then
   integer, parameter :: halvings = 16
 

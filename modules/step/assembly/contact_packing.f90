@@ -13,6 +13,7 @@ module gravier_contact_packing
   use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_bond_turning, only: find_bond_velocity
+  use gravier_bonded_groups, only: bonded_groups_t, find_bonded_groups
   use gravier_physics, only: physics_t
   use gravier_narrow_phase, only: contact_list_t, place_of
   implicit none
@@ -30,6 +31,9 @@ module gravier_contact_packing
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
     !> what its law makes of the step
     type(contact_terms_t) :: terms
+    !> No boundary moves. Bodies that one moves, and that start from forces of 0, would seem to be solved before their motion has
+    !> come through them: few of their contacts see it.
+    logical :: rests = .false.
   end type packed_t
 
   !> gap over the radius of the candidate that is rounding
@@ -75,6 +79,10 @@ contains
       allocate (start(kernels%nv, 0))
     end if
     before = -1
+    this%rests = .true.
+    do c = 1, size(boundaries)
+      this%rests = this%rests .and. .not. (boundaries(c)%present .and. boundaries(c)%is_moved())
+    end do
     do c = 1, found%n
       call find_packed(view, found, c, this)
       sub%source(c) = this%p
@@ -258,8 +266,8 @@ contains
       sub%hot(q, row%shift, g) = terms%free_gap/h
       if (allocated(sub%attraction)) then
         sub%attraction(q, g) = h*terms%attraction
-        ! what touches, but for rounding, starts as if its attraction did nothing: the bodies press against each other by as much
-        if (.not. terms%free_gap > rounded_gap*view%bodies%radius(i)) sub%impulse(q, 1, g) = h*terms%attraction
+        ! what touches, but for rounding, may start as if its attraction did nothing: the bodies press against each other by as much
+        if (this%rests .and. .not. terms%free_gap > rounded_gap*view%bodies%radius(i)) sub%impulse(q, 1, g) = h*terms%attraction
       end if
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction
@@ -352,14 +360,24 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: velocity(kernels%nd), t(3), s(3)
+    real(dp) :: velocity(kernels%nd), t(3), s(3), spin(3)
+    type(bonded_groups_t) :: groups
+    type(contact_place_t) :: place
     type(packed_t) :: this
+    logical :: known
     integer :: c
 
+    call find_bonded_groups(view, boundaries, physics, found, groups)
     do c = 1, found%n
       call find_packed(view, found, c, this)
       if (.not. found%terms(this%f)%joins) cycle
-      call find_bond_velocity(view, boundaries, physics, this%p, place_of(view, found, this%f, joined=.true.), velocity)
+      place = place_of(view, found, this%f, joined=.true.)
+      call groups%find_spin(view, boundaries, found, this%f, known, spin)
+      if (known) then
+        call find_bond_velocity(view, boundaries, physics, this%p, place, velocity, spin)
+      else
+        call find_bond_velocity(view, boundaries, physics, this%p, place, velocity)
+      end if
       associate (contact => sub%hot(this%q, :, this%g), row => kernels%row)
         contact(row%shift) = -sum(velocity*contact(1:kernels%nd))
         if (kernels%nd == 2) then

@@ -13,6 +13,7 @@ program test_narrow_phase
   use gravier_pair_laws, only: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair
   use gravier_physics, only: physics_t
   use gravier_bond_turning, only: find_bond_velocity
+  use gravier_bonded_groups, only: bonded_groups_t, find_bonded_groups
   use gravier_narrow_phase, only: contact_list_t, find_contacts
   use gravier_test_scenes, only: plane
   use gravier_test_law_names, only: add_law
@@ -35,6 +36,7 @@ program test_narrow_phase
   call check_turning_boundary()
   call check_start_velocities()
   call check_bond_velocities()
+  call check_bonded_groups()
   call finish_checks()
 
 contains
@@ -405,6 +407,62 @@ contains
     call find_bond_velocity(view, decomposition%boundaries, physics, 1, round_place(view, 1, gap, n, joined=.true.), velocity)
     call check_close(maxval(abs(velocity)), 0.0_dp, 0.0_dp, "what hardly turns has bonds at rest")
   end subroutine check_bond_velocities
+
+  !> Four spheres that are bonded to each other, each to all others, turn as one whatever their spins; two that hang on one of them
+  !> in a row are a chain but for the bond with it. A body with two bonds to a boundary turns as that does.
+  subroutine check_bonded_groups()
+    type(local_bodies_t) :: view
+    type(decomposition_t) :: decomposition
+    type(physics_t) :: physics
+    type(contact_list_t) :: found
+    type(bonded_groups_t) :: groups
+    real(dp), parameter :: turning(3) = [3.0_dp, -2.0_dp, 1.5_dp]
+    real(dp) :: places(3, 6), spin(3)
+    integer :: k, pairs(2, 10)
+    logical :: known
+
+    places(:, :) = 0.0_dp
+    places(1, 2) = 0.2_dp
+    places(2, 3) = 0.2_dp
+    places(3, 4) = 0.2_dp
+    places(3, 5) = 0.4_dp
+    places(3, 6) = 0.6_dp
+    call make(3, places, view, decomposition)
+    do k = 1, 6
+      call turn(turning, places(:, k), view%bodies%velocity(1:3, k))
+      view%bodies%velocity(4:6, k) = 10.0_dp*k
+    end do
+    pairs = reshape([1, 2, 1, 3, 1, 4, 2, 3, 2, 4, 3, 4, 4, 5, 5, 6, 1, -1, 2, -2], [2, 10])
+    call list(view, pairs, pair_memory_t())
+    physics%theta = 1.0_dp
+    physics%h = 0.0_dp
+    found%n = 10
+    found%source = [(k, k=1, 10)]
+    found%boundary = [0, 0, 0, 0, 0, 0, 0, 0, 1, 2]
+    allocate (found%gap(10), found%normal(3, 10), found%terms(10), found%place(0))
+    do k = 1, 10
+      found%gap(k) = 0.0_dp
+      found%normal(:, k) = [0.0_dp, 0.0_dp, 1.0_dp]
+      if (k < 9) then
+        found%normal(:, k) = places(:, pairs(1, k)) - places(:, pairs(2, k))
+        found%gap(k) = norm2(found%normal(:, k)) - 0.2_dp
+        found%normal(:, k) = found%normal(:, k)/norm2(found%normal(:, k))
+      end if
+      found%terms(k)%joins = k < 9
+    end do
+    call find_bonded_groups(view, decomposition%boundaries, physics, found, groups)
+    call check(all(groups%group == [1, 1, 1, 1, 1, 0]), "three bonds make a group, a chain none")
+    call groups%find_spin(view, decomposition%boundaries, found, 4, known, spin)
+    call check(known, "a bond of the group")
+    call check_close(maxval(abs(spin - turning)), 0.0_dp, 1.0e-12_dp, "its spin is that of the places")
+    call groups%find_spin(view, decomposition%boundaries, found, 8, known, spin)
+    call check(.not. known, "a bond of the chain")
+    found%terms(9:10)%joins = .true.
+    decomposition%boundaries(1)%last_spin(3) = 7.0_dp
+    call find_bonded_groups(view, decomposition%boundaries, physics, found, groups)
+    call groups%find_spin(view, decomposition%boundaries, found, 4, known, spin)
+    call check_close(spin(3), 7.0_dp, 0.0_dp, "a group that boundaries hold by two bonds turns as the first of them")
+  end subroutine check_bonded_groups
 
   !> spin x arm
   pure subroutine turn(spin, arm, velocity)

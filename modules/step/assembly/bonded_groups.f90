@@ -1,0 +1,262 @@
+!> Bodies that bonds hold redundantly, and the spin with which they turn as one. Around a ring of bonds the velocities of the bonds
+!> have to agree exactly: what contradicts itself makes impulses without bound. The bonds of a group therefore have one spin, which
+!> is the one that fits the velocities of their bodies beside each other best. Bodies of a chain are in no group: nothing
+!> contradicts there.
+module gravier_bonded_groups
+  use gravier_kinds, only: dp
+  use gravier_rotation, only: cross
+  use gravier_boundary, only: boundary_t
+  use gravier_halo, only: local_bodies_t
+  use gravier_physics, only: physics_t
+  use gravier_surface_velocity, only: add_image_velocity
+  use gravier_narrow_phase, only: contact_list_t, place_of
+  implicit none
+  private
+  public :: bonded_groups_t, find_bonded_groups
+
+  !> bonds that a body needs so that rings of bonds through it can contradict themselves
+  integer, parameter :: most_of_chain = 2
+  !> determinant of directions, over the cube of their sum of squares, below which they lie on one line
+  real(dp), parameter :: on_line = 1.0e-12_dp
+
+  type :: bonded_groups_t
+    !> group of each body of a view, 0 for none
+    integer, allocatable :: group(:)
+    !> (3, groups) [rad/s]
+    real(dp), allocatable :: spin(:, :)
+    !> bonds of each group with boundaries (groups)
+    integer, allocatable :: held(:)
+  contains
+    procedure :: find_spin => bonded_groups_find_spin
+  end type bonded_groups_t
+
+contains
+
+  !> The groups of a view.
+  subroutine find_bonded_groups(view, boundaries, physics, found, groups)
+    type(local_bodies_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(in) :: found
+    type(bonded_groups_t), intent(out) :: groups
+    integer, allocatable :: bonds(:), root(:)
+    integer :: f, i, j, n
+
+    allocate (bonds(view%bodies%n), root(view%bodies%n), groups%group(view%bodies%n), source=0)
+    do f = 1, found%n
+      if (.not. is_first_bond(view, found, f)) cycle
+      call find_ends(view, found, f, i, j)
+      bonds(i) = bonds(i) + 1
+      if (j > 0) bonds(j) = bonds(j) + 1
+    end do
+    do f = 1, found%n
+      if (.not. is_first_bond(view, found, f)) cycle
+      call find_ends(view, found, f, i, j)
+      if (found%boundary(f) > 0 .or. j <= 0) cycle
+      if (max(bonds(i), bonds(j)) > most_of_chain) call join(i, j, root)
+    end do
+    n = 0
+    do i = 1, size(root)
+      if (root(i) == 0) cycle
+      if (root_of(i, root) == i) then
+        n = n + 1
+        groups%group(i) = n
+      end if
+    end do
+    do i = 1, size(root)
+      if (root(i) > 0) groups%group(i) = groups%group(root_of(i, root))
+    end do
+    allocate (groups%spin(3, n), source=0.0_dp)
+    allocate (groups%held(n), source=0)
+    if (n > 0) call find_spins(view, boundaries, physics, found, groups)
+  end subroutine find_bonded_groups
+
+  !> The one spin of both bodies of bond `f`: that of their group, with which a boundary turns that holds it by two bonds or more;
+  !> of bodies with several bonds between them the mean of theirs. Not known of a single bond, as in a chain.
+  pure subroutine bonded_groups_find_spin(self, view, boundaries, found, f, known, spin)
+    class(bonded_groups_t), intent(in) :: self
+    type(local_bodies_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+    logical, intent(out) :: known
+    real(dp), intent(out) :: spin(3)
+    integer :: i, j, g
+
+    call find_ends(view, found, f, i, j)
+    g = self%group(i)
+    if (g == 0 .and. j > 0) g = self%group(max(j, 1))
+    known = .false.
+    spin(:) = 0.0_dp
+    if (found%boundary(f) > 0) then
+      if (g > 0) known = self%held(g) >= 2
+      if (known .or. is_one_of_several(view, found, f)) then
+        known = .true.
+        spin(:) = boundaries(found%boundary(f))%last_spin
+      end if
+    else if (g > 0 .and. self%group(i) == self%group(max(j, 1))) then
+      known = .true.
+      spin(:) = self%spin(:, g)
+    else if (is_one_of_several(view, found, f)) then
+      known = .true.
+      if (view%bodies%nd == 2) then
+        spin(3) = 0.5_dp*(view%bodies%velocity(3, i) + view%bodies%velocity(3, j))
+      else
+        spin(:) = 0.5_dp*(view%bodies%velocity(4:6, i) + view%bodies%velocity(4:6, j))
+      end if
+    end if
+  end subroutine bonded_groups_find_spin
+
+  !> Whether contact `f` is one of several bonds of a pair.
+  pure logical function is_one_of_several(view, found, f) result(several)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+
+    several = .false.
+    if (f > 1) several = is_bond_of(view, found, f - 1, f)
+    if (f < found%n .and. .not. several) several = is_bond_of(view, found, f + 1, f)
+  end function is_one_of_several
+
+  !> Fit the spins of all groups. A group that has two bonds or more with boundaries turns as the first of these does.
+  subroutine find_spins(view, boundaries, physics, found, groups)
+    type(local_bodies_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(in) :: found
+    type(bonded_groups_t), intent(inout) :: groups
+    real(dp) :: matrix(3, 3, size(groups%spin, 2)), right(3, size(groups%spin, 2)), branch(3), v(3), turning(3)
+    integer :: holder(size(groups%spin, 2)), f, i, j, g, d
+
+    matrix(:, :, :) = 0.0_dp
+    right(:, :) = 0.0_dp
+    holder(:) = huge(1)
+    do f = 1, found%n
+      if (.not. is_first_bond(view, found, f)) cycle
+      call find_ends(view, found, f, i, j)
+      if (found%boundary(f) > 0) then
+        g = groups%group(i)
+        if (g == 0 .and. j > 0) g = groups%group(max(j, 1))
+        if (g == 0) cycle
+        groups%held(g) = groups%held(g) + 1
+        holder(g) = min(holder(g), found%boundary(f))
+        cycle
+      end if
+      g = groups%group(i)
+      if (g == 0 .or. g /= groups%group(j)) cycle
+      call branch_at_start(view, physics, found, f, branch, v)
+      turning(:) = cross(branch, v)
+      right(:, g) = right(:, g) + turning
+      do d = 1, 3
+        matrix(d, d, g) = matrix(d, d, g) + sum(branch**2)
+        matrix(:, d, g) = matrix(:, d, g) - branch(d)*branch
+      end do
+    end do
+    do g = 1, size(groups%held)
+      if (groups%held(g) >= 2) then
+        groups%spin(:, g) = boundaries(holder(g))%last_spin
+      else if (view%bodies%nd == 2) then
+        groups%spin(3, g) = right(3, g)/matrix(3, 3, g)
+      else
+        call solve(matrix(:, :, g), right(:, g), groups%spin(:, g))
+      end if
+    end do
+  end subroutine find_spins
+
+  !> The branch of a bond at the start of the step, from the antagonist to the candidate [m], and its velocity [m/s].
+  pure subroutine branch_at_start(view, physics, found, f, branch, v)
+    type(local_bodies_t), intent(in) :: view
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+    real(dp), intent(out) :: branch(3), v(3)
+    real(dp) :: other(3)
+    integer :: nd
+
+    nd = view%bodies%nd
+    v(:) = 0.0_dp
+    other(:) = 0.0_dp
+    associate (p => found%source(f), place => place_of(view, found, f, joined=.true.))
+      v(1:nd) = view%bodies%velocity(1:nd, view%list%candidate(p))
+      other(1:nd) = view%bodies%velocity(1:nd, view%list%antagonist(p))
+      call add_image_velocity(view, p, other(1:nd))
+      v(:) = v - other
+      branch(:) = place%arm_j - place%arm_i - (1.0_dp - physics%theta)*physics%h*v
+    end associate
+  end subroutine branch_at_start
+
+  !> x of matrix x = right by Cramer's rule; 0 where all branches lie on one line.
+  pure subroutine solve(matrix, right, x)
+    real(dp), intent(in) :: matrix(3, 3), right(3)
+    real(dp), intent(out) :: x(3)
+    real(dp) :: one(3), two(3), three(3), determinant
+
+    one(:) = cross(matrix(:, 2), matrix(:, 3))
+    two(:) = cross(matrix(:, 3), matrix(:, 1))
+    three(:) = cross(matrix(:, 1), matrix(:, 2))
+    determinant = sum(matrix(:, 1)*one)
+    x(:) = 0.0_dp
+    if (.not. determinant > on_line*(matrix(1, 1) + matrix(2, 2) + matrix(3, 3))**3) return
+    x(1) = sum(one*right)/determinant
+    x(2) = sum(two*right)/determinant
+    x(3) = sum(three*right)/determinant
+  end subroutine solve
+
+  !> Bodies of contact `f`; the antagonist is 0 where it is a boundary.
+  pure subroutine find_ends(view, found, f, i, j)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+    integer, intent(out) :: i, j
+
+    i = view%list%candidate(found%source(f))
+    j = max(view%list%antagonist(found%source(f)), 0)
+  end subroutine find_ends
+
+  !> Whether contact `f` is a bond, and the first of its pair.
+  pure logical function is_first_bond(view, found, f) result(first)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: f
+
+    first = found%terms(f)%joins
+    if (first .and. f > 1) first = .not. is_bond_of(view, found, f - 1, f)
+  end function is_first_bond
+
+  !> Whether contact `other` is a bond of the same pair as contact `f`.
+  pure logical function is_bond_of(view, found, other, f) result(same)
+    type(local_bodies_t), intent(in) :: view
+    type(contact_list_t), intent(in) :: found
+    integer, intent(in) :: other, f
+
+    associate (p => found%source(f), q => found%source(other))
+      same = found%terms(other)%joins .and. view%list%candidate(p) == view%list%candidate(q) .and. &
+        & view%list%antagonist(p) == view%list%antagonist(q)
+    end associate
+  end function is_bond_of
+
+  !> Put two bodies into one group: a root is the lowest of its bodies.
+  pure subroutine join(i, j, root)
+    integer, intent(in) :: i, j
+    integer, intent(inout) :: root(:)
+    integer :: a, b
+
+    if (root(i) == 0) root(i) = i
+    if (root(j) == 0) root(j) = j
+    a = root_of(i, root)
+    b = root_of(j, root)
+    root(max(a, b)) = min(a, b)
+    root(i) = min(a, b)
+    root(j) = min(a, b)
+  end subroutine join
+
+  pure integer function root_of(i, root) result(r)
+    integer, intent(in) :: i, root(:)
+
+    r = i
+    do while (root(r) /= r)
+      r = root(r)
+    end do
+  end function root_of
+
+end module gravier_bonded_groups
