@@ -228,7 +228,7 @@ class Reference(unittest.TestCase):
             self.assertEqual({path.stem.removeprefix(f"{kind}_") for path in self.DIRECTORY.glob(f"{kind}_*.md")}, set(words),
                              f"doc/reference: expected a page {kind}_WORD.md for each {key} of &{group} and no other")
         # the effects of the log, each in the page that explains it
-        pages = {"drives": "drives", "driven by forces": "forces_on_boundaries", "glued grains": None, "periodic images": "periodic_cells", "moving cell": "periodic_cells",
+        pages = {"drives": "drives", "driven by forces": "forces_on_boundaries", "glued grains": "boundary_grains.md", "bonds": "law_bonded.md", "periodic images": "periodic_cells", "moving cell": "periodic_cells",
                  "rolling resistance": "rolling_and_pivoting", "pivoting resistance": "rolling_and_pivoting", "body force": "gravity"}
         with tempfile.TemporaryDirectory() as directory:
             (Path(directory) / "case.nml").write_text("&scene bodies = 'column' /\n&time step = 0.01, steps = 1 /\n", encoding="ascii")
@@ -239,7 +239,7 @@ class Reference(unittest.TestCase):
         self.assertGreater(len(effects), 12)
         for name in effects:
             page = pages.get(name, name.replace(" ", "_"))
-            path = self.DIRECTORY / ("boundary_grains.md" if page is None else f"effect_{page}.md")
+            path = self.DIRECTORY / (page if page.endswith(".md") else f"effect_{page}.md")
             self.assertTrue(path.exists(), f"{path}: no page for the effect {name}")
 
 

@@ -71,7 +71,7 @@ class Commands(RunTestCase):
         write(os.path.join(directory, "case.nml"),
               namelist(merged(SPHERES, {"scene": {"friction": 0.0, "gravity": [0.0, 0.0, 0.0]}})))
         run = gravier("--check", "case.nml", directory=directory)
-        for expected in ("3D: nothing", "off         friction, rotation, restitution, ", ", gravity, body force, removal, insertion, moving cell\n", "3 degrees of freedom a grain",
+        for expected in ("3D: nothing", "off         friction, rotation, restitution, ", ", gravity, body force, removal, insertion, moving cell, bonds\n", "3 degrees of freedom a grain",
                          "1 unknowns a contact"):
             self.assertIn(expected, run.stdout)
 

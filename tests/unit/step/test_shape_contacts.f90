@@ -160,6 +160,10 @@ contains
     call check(seen%normal(1) < -0.3_dp .and. seen%normal(nd) > 0.3_dp, "obliquely")
     call check(cleared%gap(1) > seen%gap(1), "boxes go past each other")
     call check_close(minval(cleared%gap(1:seen%n)), -2.0_dp*gap*seen%normal(1), tight, "with the velocity that they have")
+    view%bodies%position(nd, 2) = place(nd) + 1.0e-9_dp
+    call go_on(view, decomposition, h, seen, cleared)
+    call check_equal(seen%n, merge(1, 2, nd == 2), "sides do not meet beyond their cores")
+    call check(seen%normal(1) < -0.3_dp .and. seen%normal(nd) > 0.3_dp, "but corners, obliquely")
     view%bodies%position(nd, 2) = place(nd) + 0.1_dp*gap
     call go_on(view, decomposition, h, seen, cleared)
     call check(seen%n > 0, "a box that is lower")
@@ -169,6 +173,14 @@ contains
     call go_on(view, decomposition, h, seen, cleared)
     call check(seen%n > 0, "a box that strikes the side")
     call check_close(cleared%gap(1), seen%gap(1), 0.0_dp, "however fast it is")
+    ! one that comes down on the other is not let in, by however little
+    view%bodies%position(:, 2) = 0.0_dp
+    view%bodies%position(nd, 2) = -2.0_dp - gap
+    view%bodies%velocity(1, 1) = 0.0_dp
+    view%bodies%velocity(nd, 1) = -(gap + 1.0e-5_dp)/h
+    call go_on(view, decomposition, h, seen, cleared)
+    call check(seen%n > 1, "a box that comes down")
+    call check_close(cleared%gap(1), seen%gap(1), 0.0_dp, "it is stopped where it touches")
   end subroutine test_passing
 
   !> The points of the two bodies, and with their paths looked at.
