@@ -10,6 +10,7 @@ module gravier_creeping_groups
   use gravier_body_mass, only: apply_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_disjoint_sets, only: first_of
   implicit none
   private
   public :: creep_t, find_creep
@@ -190,19 +191,19 @@ contains
     end do
     do c = 1, sub%n_contacts
       if (force(problem, sub%impulse, c) < least) cycle
-      i = first_of(sub%pair(1, c))
-      j = first_of(sub%pair(2, c))
+      i = group_of(sub%pair(1, c))
+      j = group_of(sub%pair(2, c))
       if (min(i, j) > 0) first(max(i, j)) = min(i, j)
     end do
     do b = 1, sub%n_grains
-      first(b) = first_of(b)
+      first(b) = group_of(b)
     end do
     contacts(:) = 0
     grains(:) = 0
     squares(:) = 0.0_dp
     do c = 1, sub%n_contacts
       if (force(problem, sub%impulse, c) < least) cycle
-      i = max(first_of(sub%pair(1, c)), first_of(sub%pair(2, c)))
+      i = max(group_of(sub%pair(1, c)), group_of(sub%pair(2, c)))
       if (i > 0) contacts(i) = contacts(i) + 1
     end do
     do b = 1, sub%n_grains
@@ -220,16 +221,13 @@ contains
   contains
 
     !> The first grain of the group of a column, 0 for what is no grain.
-    pure integer function first_of(column) result(b)
+    pure integer function group_of(column) result(b)
       integer, intent(in) :: column
 
       b = 0
       if (column > sub%n_grains) return
-      b = column
-      do while (first(b) /= b)
-        b = first(b)
-      end do
-    end function first_of
+      b = first_of(column, first)
+    end function group_of
 
   end subroutine find_largest_group
 

@@ -13,10 +13,10 @@ module gravier_bond_turning
   use gravier_boundary, only: boundary_t
   use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
-  use gravier_surface_velocity, only: contact_place_t, add_image_velocity
+  use gravier_surface_velocity, only: contact_place_t, add_image_velocity, boundary_that_has
   implicit none
   private
-  public :: find_bond_velocity
+  public :: find_bond_velocity, find_spin, find_branch
 
   !> way in a step, over the radius of the candidate, that is not worth a velocity: that of disks which turn by 1e-4 rad. Bonds of
   !> bodies at rest, which solves leave some velocity, have none then, and rest stays possible for them.
@@ -121,15 +121,6 @@ contains
     call bend(spin, turning, t, change)
   end subroutine find_lacking
 
-  !> The boundary that body `k` is, or is glued to; 0 of a free grain.
-  pure integer function boundary_that_has(view, k) result(b)
-    type(local_bodies_t), intent(in) :: view
-    integer, intent(in) :: k
-
-    b = -k
-    if (k > 0) b = view%bodies%glued(k)
-  end function boundary_that_has
-
   !> Spin of body `k` at the start of the step; what is part of a boundary turns with it [rad/s].
   pure subroutine find_spin(view, boundaries, k, spin)
     type(local_bodies_t), intent(in) :: view
@@ -158,26 +149,36 @@ contains
     integer, intent(in) :: p
     type(contact_place_t), intent(in) :: place
     real(dp), intent(out) :: spin(3)
-    real(dp) :: v(3), other(3), axis(3), spins(3, 2), length
-    integer :: nd
+    real(dp) :: v(3), axis(3), spins(3, 2), length
 
-    nd = view%bodies%nd
-    v(:) = 0.0_dp
-    other(:) = 0.0_dp
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      v(1:nd) = view%bodies%velocity(1:nd, i)
-      other(1:nd) = view%bodies%velocity(1:nd, j)
-      call find_spin(view, boundaries, i, spins(:, 1))
-      call find_spin(view, boundaries, j, spins(:, 2))
-    end associate
-    call add_image_velocity(view, p, other(1:nd))
-    v(:) = v - other
-    axis(:) = place%arm_j - place%arm_i - (1.0_dp - physics%theta)*physics%h*v
+    call find_spin(view, boundaries, view%list%candidate(p), spins(:, 1))
+    call find_spin(view, boundaries, view%list%antagonist(p), spins(:, 2))
+    call find_branch(view, physics, p, place, axis, v)
     length = max(norm2(axis), tiny(1.0_dp))
     axis(:) = axis/length
     v(:) = v/length
     spin(:) = cross(axis, v)
     spin(:) = spin + 0.5_dp*(sum(axis*spins(:, 1)) + sum(axis*spins(:, 2)))*axis
   end subroutine find_spin_of_branch
+
+  !> The branch of two grains at the start of the step, from the antagonist to the candidate [m], and its velocity [m/s].
+  pure subroutine find_branch(view, physics, p, place, branch, v)
+    type(local_bodies_t), intent(in) :: view
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: p
+    type(contact_place_t), intent(in) :: place
+    real(dp), intent(out) :: branch(3), v(3)
+    real(dp) :: other(3)
+    integer :: nd
+
+    nd = view%bodies%nd
+    v(:) = 0.0_dp
+    other(:) = 0.0_dp
+    v(1:nd) = view%bodies%velocity(1:nd, view%list%candidate(p))
+    other(1:nd) = view%bodies%velocity(1:nd, view%list%antagonist(p))
+    call add_image_velocity(view, p, other(1:nd))
+    v(:) = v - other
+    branch(:) = place%arm_j - place%arm_i - (1.0_dp - physics%theta)*physics%h*v
+  end subroutine find_branch
 
 end module gravier_bond_turning

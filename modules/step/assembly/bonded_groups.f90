@@ -5,10 +5,11 @@
 module gravier_bonded_groups
   use gravier_kinds, only: dp
   use gravier_rotation, only: cross
+  use gravier_disjoint_sets, only: first_of
   use gravier_boundary, only: boundary_t
   use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
-  use gravier_surface_velocity, only: add_image_velocity
+  use gravier_bond_turning, only: find_spin, find_branch
   use gravier_narrow_phase, only: contact_list_t, place_of
   implicit none
   private
@@ -58,13 +59,13 @@ contains
     n = 0
     do i = 1, size(root)
       if (root(i) == 0) cycle
-      if (root_of(i, root) == i) then
+      if (first_of(i, root) == i) then
         n = n + 1
         groups%group(i) = n
       end if
     end do
     do i = 1, size(root)
-      if (root(i) > 0) groups%group(i) = groups%group(root_of(i, root))
+      if (root(i) > 0) groups%group(i) = groups%group(first_of(i, root))
     end do
     allocate (groups%spin(3, n), source=0.0_dp)
     allocate (groups%held(n), source=0)
@@ -81,6 +82,7 @@ contains
     integer, intent(in) :: f
     logical, intent(out) :: known
     real(dp), intent(out) :: spin(3)
+    real(dp) :: other(3)
     integer :: i, j, g
 
     call find_ends(view, found, f, i, j)
@@ -99,11 +101,9 @@ contains
       spin(:) = self%spin(:, g)
     else if (is_one_of_several(view, found, f)) then
       known = .true.
-      if (view%bodies%nd == 2) then
-        spin(3) = 0.5_dp*(view%bodies%velocity(3, i) + view%bodies%velocity(3, j))
-      else
-        spin(:) = 0.5_dp*(view%bodies%velocity(4:6, i) + view%bodies%velocity(4:6, j))
-      end if
+      call find_spin(view, boundaries, i, spin)
+      call find_spin(view, boundaries, j, other)
+      spin(:) = 0.5_dp*(spin + other)
     end if
   end subroutine bonded_groups_find_spin
 
@@ -144,7 +144,7 @@ contains
       end if
       g = groups%group(i)
       if (g == 0 .or. g /= groups%group(j)) cycle
-      call branch_at_start(view, physics, found, f, branch, v)
+      call find_branch(view, physics, found%source(f), place_of(view, found, f, joined=.true.), branch, v)
       turning(:) = cross(branch, v)
       right(:, g) = right(:, g) + turning
       do d = 1, 3
@@ -162,28 +162,6 @@ contains
       end if
     end do
   end subroutine find_spins
-
-  !> The branch of a bond at the start of the step, from the antagonist to the candidate [m], and its velocity [m/s].
-  pure subroutine branch_at_start(view, physics, found, f, branch, v)
-    type(local_bodies_t), intent(in) :: view
-    type(physics_t), intent(in) :: physics
-    type(contact_list_t), intent(in) :: found
-    integer, intent(in) :: f
-    real(dp), intent(out) :: branch(3), v(3)
-    real(dp) :: other(3)
-    integer :: nd
-
-    nd = view%bodies%nd
-    v(:) = 0.0_dp
-    other(:) = 0.0_dp
-    associate (p => found%source(f), place => place_of(view, found, f, joined=.true.))
-      v(1:nd) = view%bodies%velocity(1:nd, view%list%candidate(p))
-      other(1:nd) = view%bodies%velocity(1:nd, view%list%antagonist(p))
-      call add_image_velocity(view, p, other(1:nd))
-      v(:) = v - other
-      branch(:) = place%arm_j - place%arm_i - (1.0_dp - physics%theta)*physics%h*v
-    end associate
-  end subroutine branch_at_start
 
   !> x of matrix x = right by Cramer's rule; 0 where all branches lie on one line.
   pure subroutine solve(matrix, right, x)
@@ -243,20 +221,11 @@ contains
 
     if (root(i) == 0) root(i) = i
     if (root(j) == 0) root(j) = j
-    a = root_of(i, root)
-    b = root_of(j, root)
+    a = first_of(i, root)
+    b = first_of(j, root)
     root(max(a, b)) = min(a, b)
     root(i) = min(a, b)
     root(j) = min(a, b)
   end subroutine join
-
-  pure integer function root_of(i, root) result(r)
-    integer, intent(in) :: i, root(:)
-
-    r = i
-    do while (root(r) /= r)
-      r = root(r)
-    end do
-  end function root_of
 
 end module gravier_bonded_groups

@@ -9,7 +9,7 @@ module gravier_surface_velocity
   implicit none
   private
   public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
-    & add_image_velocity
+    & add_image_velocity, boundary_that_has
 
   !> Where two bodies touch.
   type :: contact_place_t
@@ -58,8 +58,7 @@ contains
     real(dp), intent(out) :: v(:)
     integer :: b
 
-    b = -k
-    if (k > 0) b = view%bodies%glued(k)
+    b = boundary_that_has(view, k)
     if (b == 0) then
       v(:) = view%bodies%velocity(1:size(v), k)
     else
@@ -67,6 +66,15 @@ contains
       call boundaries(b)%last_velocity_at(point, v(1:size(point)))
     end if
   end subroutine find_start_velocity
+
+  !> The boundary that body `k` is, or is glued to; 0 of a free grain.
+  pure integer function boundary_that_has(view, k) result(b)
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: k
+
+    b = -k
+    if (k > 0) b = view%bodies%glued(k)
+  end function boundary_that_has
 
   !> Velocity of grain `k` at the point of its surface that `arm` leads to from its centre.
   pure subroutine find_surface_velocity(view, boundaries, k, arm, v)

@@ -10,6 +10,7 @@ program test_small_modules
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
+  use gravier_disjoint_sets, only: first_of
   use gravier_test_scenes, only: plane, change_shape
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -18,6 +19,7 @@ program test_small_modules
   call check_pause()
   call check_heap()
   call check_facing_planes()
+  call check(first_of(4, [1, 1, 3, 2]) == 1 .and. first_of(3, [1, 1, 3, 2]) == 3, "the first of a set")
   call finish_checks()
 
 contains
