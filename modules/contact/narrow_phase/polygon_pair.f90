@@ -12,7 +12,7 @@ module gravier_polygon_pair
   use gravier_manifold, only: manifold_t, feature_base
   implicit none
   private
-  public :: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold
+  public :: placed_piece_t, place_piece, find_polygon_manifold, find_plane_manifold, find_shortest_way
 
   !> sine of the angle within which sides face each other; angle from which on sides end where the core does [rad]
   real(dp), parameter :: facing_angle = 0.34_dp, blend_angle = 0.02_dp
@@ -210,6 +210,23 @@ contains
 
     separation = sum(normal*(a%vertex(:, extreme_vertex(a, -1.0_dp, normal)) - b%vertex(:, extreme_vertex(b, 1.0_dp, normal))))
   end function separation
+
+  !> The shortest way between two cores, from b to a.
+  pure subroutine find_shortest_way(a, b, overlap, normal, distance, on_a, on_b)
+    type(placed_piece_t), intent(in) :: a, b
+    !> they are not apart: the rest is not known
+    logical, intent(out) :: overlap
+    !> unit vector, and its length [m]
+    real(dp), intent(out) :: normal(2), distance
+    !> its ends [m]
+    real(dp), intent(out) :: on_a(2), on_b(2)
+
+    on_a(:) = 0.0_dp
+    on_b(:) = 0.0_dp
+    call find_separation(a, b, huge(1.0_dp), normal, distance)
+    overlap = .not. distance > 0.0_dp
+    if (.not. overlap) call find_distance(a, b, normal, distance, on_a, on_b)
+  end subroutine find_shortest_way
 
   !> The shortest way between cores that are apart.
   pure subroutine find_distance(a, b, normal, distance, on_a, on_b)

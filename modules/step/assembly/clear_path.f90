@@ -8,13 +8,13 @@ module gravier_clear_path
   use gravier_convex_piece, only: convex_piece_t
   use gravier_manifold, only: manifold_t
   use gravier_seen_body, only: seen_body_t
-  use gravier_piece_meeting, only: room_t, meet_pieces
+  use gravier_piece_meeting, only: room_t, nearest_t, find_nearest_points
   implicit none
   private
   public :: clear_path
 
-  !> cosine of the angle by which the normal has to turn for a path to be looked at: 0.02 rad
-  real(dp), parameter :: turned = 0.9998_dp
+  !> angle by which the normal has to turn for a path to be looked at [rad]
+  real(dp), parameter :: turned = 0.02_dp
   !> overlap on the way that is none, over the roundings of both pieces, and over the radii of both bodies where that is less
   real(dp), parameter :: touching = 0.1_dp, small = 1.0e-4_dp
   !> halvings of the path: a way of a thousand roundings is known to `touching` then
@@ -22,7 +22,7 @@ module gravier_clear_path
 
   !> Two pieces at a time of their path.
   type :: instant_t
-    !> [s]; least gap of all points [m], and least rate at which their gaps change [m/s]
+    !> [s]; gap [m], and the rate at which it changes [m/s]
     real(dp) :: time = 0.0_dp, gap = 0.0_dp, rate = 0.0_dp
     real(dp) :: normal(3) = 0.0_dp
   end type instant_t
@@ -39,22 +39,31 @@ contains
     type(room_t), intent(inout) :: room
     type(manifold_t), intent(inout) :: manifold
     type(instant_t) :: ends(2)
-    real(dp) :: rate(manifold%n), least
+    real(dp) :: rate(manifold%n), v(3), reach, least, gap, slip
     integer :: c
     logical :: closes
 
     if (manifold%n == 0) return
-    least = min(touching*(a%radius*piece_a%rounding + b%radius*piece_b%rounding), small*(a%radius + b%radius))
-    if (manifold%cores_overlap .or. .not. minval(manifold%gap(1:manifold%n)) > -least) return
+    reach = a%radius*piece_a%rounding + b%radius*piece_b%rounding
+    least = min(touching*reach, small*(a%radius + b%radius))
+    gap = minval(manifold%gap(1:manifold%n))
+    if (manifold%cores_overlap .or. .not. gap > -least) return
     closes = .false.
+    slip = 0.0_dp
     do c = 1, manifold%n
-      rate(c) = rate_of(a, b, manifold, c)
+      call relative_velocity(a, b, manifold%point(:, c), v)
+      rate(c) = dot_product(v, manifold%normal)
+      slip = max(slip, norm2(v))
       closes = closes .or. manifold%gap(c) + h*rate(c) < 0.0_dp
     end do
     if (.not. closes) return
-    ends(1) = instant_t(0.0_dp, minval(manifold%gap(1:manifold%n)), minval(rate), manifold%normal)
+    ! the normal turns with the spins, and by the slip over the distance of the cores at most
+    slip = slip/max(reach + gap, tiny(1.0_dp))
+    if (h*(slip + norm2(a%spin) + norm2(b%spin)) < turned) return
+    ends(1) = instant_t(0.0_dp, gap, minval(rate), manifold%normal)
     call look(piece_a, piece_b, h, a, b, room, ends(2))
-    if (.not. dot_product(ends(1)%normal, ends(2)%normal) < turned) return
+    if (ends(2)%gap < -least) return
+    if (.not. dot_product(ends(1)%normal, ends(2)%normal) < cos(turned)) return
     if (.not. is_clear(piece_a, piece_b, a, b, least, room, ends)) return
     do c = 1, manifold%n
       manifold%gap(c) = max(manifold%gap(c), -h*rate(c))
@@ -97,7 +106,7 @@ contains
     time = (high%gap - low%gap - high%rate*(high%time - low%time))/(low%rate - high%rate)
   end function meeting_time
 
-  !> Two pieces after some time on their way.
+  !> Two pieces after some time on their way. The gap is far below 0 where their cores overlap.
   subroutine look(piece_a, piece_b, time, a, b, room, instant)
     type(convex_piece_t), intent(in) :: piece_a, piece_b
     !> [s]
@@ -106,8 +115,8 @@ contains
     type(room_t), intent(inout) :: room
     type(instant_t), intent(out) :: instant
     type(seen_body_t) :: moved_a, moved_b
-    type(manifold_t) :: manifold
-    integer :: c
+    type(nearest_t) :: near
+    real(dp) :: v(3)
 
     moved_a = a
     moved_b = b
@@ -115,16 +124,14 @@ contains
     call move(time, moved_b)
     moved_b%centre(:) = moved_b%centre - moved_a%centre
     moved_a%centre(:) = 0.0_dp
-    call meet_pieces(piece_a, piece_b, moved_a, moved_b, norm2(moved_b%centre), room, manifold)
+    call find_nearest_points(piece_a, piece_b, moved_a, moved_b, room, near)
     instant%time = time
-    instant%normal(:) = manifold%normal
-    instant%gap = huge(1.0_dp)
-    if (manifold%n == 0) return
-    instant%gap = minval(manifold%gap(1:manifold%n))
-    instant%rate = huge(1.0_dp)
-    do c = 1, manifold%n
-      instant%rate = min(instant%rate, rate_of(moved_a, moved_b, manifold, c))
-    end do
+    instant%gap = -huge(1.0_dp)
+    if (near%overlap) return
+    instant%normal(:) = near%normal
+    instant%gap = near%gap
+    call relative_velocity(moved_a, moved_b, near%point, v)
+    instant%rate = dot_product(v, near%normal)
   end subroutine look
 
   !> Move a body with its velocity and its spin.
@@ -143,19 +150,19 @@ contains
     end do
   end subroutine move
 
-  !> Rate at which the gap of a point changes [m/s].
-  pure real(dp) function rate_of(a, b, manifold, c) result(rate)
+  !> Velocity of body a against body b at a point, seen from the centre of a [m/s].
+  pure subroutine relative_velocity(a, b, point, v)
     type(seen_body_t), intent(in) :: a, b
-    type(manifold_t), intent(in) :: manifold
-    integer, intent(in) :: c
-    real(dp) :: arm(3), v(3)
+    !> [m]
+    real(dp), intent(in) :: point(3)
+    real(dp), intent(out) :: v(3)
+    real(dp) :: arm(3), turning(3)
 
-    arm(:) = manifold%point(:, c)
-    v(:) = cross(a%spin, arm)
-    rate = sum((a%velocity - b%velocity + v)*manifold%normal)
-    arm(:) = arm - b%centre
-    v(:) = cross(b%spin, arm)
-    rate = rate - sum(v*manifold%normal)
-  end function rate_of
+    turning(:) = cross(a%spin, point)
+    v(:) = a%velocity - b%velocity + turning
+    arm(:) = point - b%centre
+    turning(:) = cross(b%spin, arm)
+    v(:) = v - turning
+  end subroutine relative_velocity
 
 end module gravier_clear_path
