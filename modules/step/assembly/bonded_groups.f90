@@ -72,8 +72,9 @@ contains
     if (n > 0) call find_spins(view, boundaries, physics, found, groups)
   end subroutine find_bonded_groups
 
-  !> The one spin of both bodies of bond `f`: that of their group, with which a boundary turns that holds it by two bonds or more;
-  !> of bodies with several bonds between them the mean of theirs. Not known of a single bond, as in a chain.
+  !> The one spin of both bodies of contact `f`: that of their group, with which a boundary turns that holds it by two bonds or more;
+  !> of bodies with several contacts between them, other than `f` at least one of them a bond, the mean of theirs. Not known of a
+  !> single bond, as in a chain, and of other contacts between bodies that no bonds make one.
   pure subroutine bonded_groups_find_spin(self, view, boundaries, found, f, known, spin)
     class(bonded_groups_t), intent(in) :: self
     type(local_bodies_t), intent(in) :: view
@@ -91,15 +92,15 @@ contains
     known = .false.
     spin(:) = 0.0_dp
     if (found%boundary(f) > 0) then
-      if (g > 0) known = self%held(g) >= 2
-      if (known .or. is_one_of_several(view, found, f)) then
+      if (g > 0 .and. found%terms(f)%joins) known = self%held(g) >= 2
+      if (known .or. has_bond_beside(view, found, f)) then
         known = .true.
         spin(:) = boundaries(found%boundary(f))%last_spin
       end if
     else if (g > 0 .and. self%group(i) == self%group(max(j, 1))) then
       known = .true.
       spin(:) = self%spin(:, g)
-    else if (is_one_of_several(view, found, f)) then
+    else if (has_bond_beside(view, found, f)) then
       known = .true.
       call find_spin(view, boundaries, i, spin)
       call find_spin(view, boundaries, j, other)
@@ -107,16 +108,23 @@ contains
     end if
   end subroutine bonded_groups_find_spin
 
-  !> Whether contact `f` is one of several bonds of a pair.
-  pure logical function is_one_of_several(view, found, f) result(several)
+  !> Whether the pair of contact `f` has a bond beside it. The contacts of a pair follow each other.
+  pure logical function has_bond_beside(view, found, f) result(has)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     integer, intent(in) :: f
+    integer :: other, way
 
-    several = .false.
-    if (f > 1) several = is_bond_of(view, found, f - 1, f)
-    if (f < found%n .and. .not. several) several = is_bond_of(view, found, f + 1, f)
-  end function is_one_of_several
+    has = .false.
+    do way = -1, 1, 2
+      other = f + way
+      do while (other >= 1 .and. other <= found%n)
+        if (.not. is_same_pair(view, found, other, f)) exit
+        has = has .or. found%terms(other)%joins
+        other = other + way
+      end do
+    end do
+  end function has_bond_beside
 
   !> Fit the spins of all groups. A group that has two bonds or more with boundaries turns as the first of these does.
   subroutine find_spins(view, boundaries, physics, found, groups)
@@ -196,22 +204,27 @@ contains
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     integer, intent(in) :: f
+    integer :: other
 
     first = found%terms(f)%joins
-    if (first .and. f > 1) first = .not. is_bond_of(view, found, f - 1, f)
+    other = f - 1
+    do while (first .and. other >= 1)
+      if (.not. is_same_pair(view, found, other, f)) exit
+      first = .not. found%terms(other)%joins
+      other = other - 1
+    end do
   end function is_first_bond
 
-  !> Whether contact `other` is a bond of the same pair as contact `f`.
-  pure logical function is_bond_of(view, found, other, f) result(same)
+  !> Whether two contacts are of the same pair.
+  pure logical function is_same_pair(view, found, other, f) result(same)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     integer, intent(in) :: other, f
 
     associate (p => found%source(f), q => found%source(other))
-      same = found%terms(other)%joins .and. view%list%candidate(p) == view%list%candidate(q) .and. &
-        & view%list%antagonist(p) == view%list%antagonist(q)
+      same = view%list%candidate(p) == view%list%candidate(q) .and. view%list%antagonist(p) == view%list%antagonist(q)
     end associate
-  end function is_bond_of
+  end function is_same_pair
 
   !> Put two bodies into one group: a root is the lowest of its bodies.
   pure subroutine join(i, j, root)

@@ -352,7 +352,8 @@ contains
     end do
   end subroutine pack_returned
 
-  !> The velocities that bonds have in bodies that turn: shifts of the law, which holds for v + shift.
+  !> The velocities that bonds have in bodies that turn: shifts of the law, which holds for v + shift. Other contacts between bodies
+  !> that bonds make one let them come as near as they do in turning, and hold them against sliding from there.
   subroutine pack_bonds(view, found, boundaries, kernels, physics, sub)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
@@ -360,7 +361,7 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: velocity(kernels%nd), t(3), s(3), spin(3)
+    real(dp) :: velocity(kernels%nd), t(3), s(3), spin(3), allowed
     type(bonded_groups_t) :: groups
     type(contact_place_t) :: place
     type(packed_t) :: this
@@ -370,16 +371,17 @@ contains
     call find_bonded_groups(view, boundaries, physics, found, groups)
     do c = 1, found%n
       call find_packed(view, found, c, this)
-      if (.not. found%terms(this%f)%joins) cycle
-      place = place_of(view, found, this%f, joined=.true.)
       call groups%find_spin(view, boundaries, found, this%f, known, spin)
+      if (.not. (known .or. this%terms%joins)) cycle
+      place = place_of(view, found, this%f, this%terms%joins)
       if (known) then
         call find_bond_velocity(view, boundaries, physics, this%p, place, velocity, spin)
       else
         call find_bond_velocity(view, boundaries, physics, this%p, place, velocity)
       end if
       associate (contact => sub%hot(this%q, :, this%g), row => kernels%row)
-        contact(row%shift) = -sum(velocity*contact(1:kernels%nd))
+        allowed = merge(-huge(1.0_dp), contact(row%shift), this%terms%joins)
+        contact(row%shift) = max(allowed, -sum(velocity*contact(1:kernels%nd)))
         if (kernels%nd == 2) then
           contact(row%shift_t) = contact(2)*velocity(1) - contact(1)*velocity(2)
         else

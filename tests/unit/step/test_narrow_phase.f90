@@ -462,6 +462,15 @@ contains
     call find_bonded_groups(view, decomposition%boundaries, physics, found, groups)
     call groups%find_spin(view, decomposition%boundaries, found, 4, known, spin)
     call check_close(spin(3), 7.0_dp, 0.0_dp, "a group that boundaries hold by two bonds turns as the first of them")
+    found%source(8:10) = 8
+    found%boundary(8:10) = 0
+    found%terms(8:10)%joins = [.true., .false., .false.]
+    call find_bonded_groups(view, decomposition%boundaries, physics, found, groups)
+    call groups%find_spin(view, decomposition%boundaries, found, 8, known, spin)
+    call check(.not. known, "a bond beside contacts that are none")
+    call groups%find_spin(view, decomposition%boundaries, found, 10, known, spin)
+    call check(known, "a contact of a pair that has a bond")
+    call check_close(spin(3), 55.0_dp, 0.0_dp, "it turns with the mean of both bodies")
   end subroutine check_bonded_groups
 
   !> spin x arm
