@@ -72,9 +72,9 @@ contains
     if (n > 0) call find_spins(view, boundaries, physics, found, groups)
   end subroutine find_bonded_groups
 
-  !> The one spin of both bodies of contact `f`: that of their group, with which a boundary turns that holds it by two bonds or more;
-  !> of bodies with several contacts between them, other than `f` at least one of them a bond, the mean of theirs. Not known of a
-  !> single bond, as in a chain, and of other contacts between bodies that no bonds make one.
+  !> The one spin of both bodies of contact `f`. It is that of their group, with which a boundary turns that holds it by two bonds
+  !> or more. Bodies with several contacts between them have the mean of theirs, if a contact beside `f` is a bond. It is not known
+  !> of a single bond, as in a chain, and of other contacts between bodies that no bonds make one.
   pure subroutine bonded_groups_find_spin(self, view, boundaries, found, f, known, spin)
     class(bonded_groups_t), intent(in) :: self
     type(local_bodies_t), intent(in) :: view

@@ -365,22 +365,23 @@ contains
     type(bonded_groups_t) :: groups
     type(contact_place_t) :: place
     type(packed_t) :: this
-    logical :: known
+    logical :: known, joins
     integer :: c
 
     call find_bonded_groups(view, boundaries, physics, found, groups)
     do c = 1, found%n
       call find_packed(view, found, c, this)
+      joins = found%terms(this%f)%joins
       call groups%find_spin(view, boundaries, found, this%f, known, spin)
-      if (.not. (known .or. this%terms%joins)) cycle
-      place = place_of(view, found, this%f, this%terms%joins)
+      if (.not. (known .or. joins)) cycle
+      place = place_of(view, found, this%f, joins)
       if (known) then
         call find_bond_velocity(view, boundaries, physics, this%p, place, velocity, spin)
       else
         call find_bond_velocity(view, boundaries, physics, this%p, place, velocity)
       end if
       associate (contact => sub%hot(this%q, :, this%g), row => kernels%row)
-        allowed = merge(-huge(1.0_dp), contact(row%shift), this%terms%joins)
+        allowed = merge(-huge(1.0_dp), contact(row%shift), joins)
         contact(row%shift) = max(allowed, -sum(velocity*contact(1:kernels%nd)))
         if (kernels%nd == 2) then
           contact(row%shift_t) = contact(2)*velocity(1) - contact(1)*velocity(2)
