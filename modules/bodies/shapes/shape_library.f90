@@ -5,13 +5,13 @@ module gravier_shape_library
   use gravier_piece_width, only: half_width_of
   implicit none
   private
-  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, of_face
+  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, face_points
 
   !> stands for a boundary in the place of the number of a shape
   integer, parameter :: boundary_number = -1
-  !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge, a face in the plane and
-  !> in space
-  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8
+  !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge or a face in the plane,
+  !> and a face in space, which has more if it has more corners
+  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8, most_of_face = 16
   !> pairs of pieces that two bodies touch with at most, besides as many as both have pieces
   integer, parameter :: more_pairs = 4
 
@@ -82,7 +82,7 @@ contains
     do k = 1, size(shape%piece)
       associate (most => self%counts%points(self%n + 1), vertex => shape%piece(k)%vertex)
         if (size(vertex, 2) > 1) most = max(most, of_edge)
-        if (size(vertex, 2) > 2 .and. size(vertex, 1) == 3) most = max(most, of_face)
+        if (size(vertex, 2) > 2 .and. size(vertex, 1) == 3) most = max(most, face_points(shape%piece(k)))
       end associate
     end do
   end subroutine shape_library_add
@@ -109,6 +109,14 @@ contains
     number = 0
   end function shape_library_find
 
+  !> The points in which a piece in space may touch with its faces. Two faces that lie on each other touch at the corners of their
+  !> common part: a face within a larger one at all of its own, if it has no more than most_of_face.
+  pure integer function face_points(piece)
+    type(convex_piece_t), intent(in) :: piece
+
+    face_points = min(most_of_face, max(of_face, piece%largest_face))
+  end function face_points
+
   !> The points in which bodies of two shapes may touch: a pair keeps as many impulses.
   pure integer function point_counts_between(self, a, b) result(points)
     class(point_counts_t), intent(in) :: self
@@ -119,7 +127,9 @@ contains
     points = self%points(a + 1)
     pieces_b = 1
     if (b /= boundary_number) then
-      points = min(points, self%points(b + 1))
+      associate (other => self%points(b + 1))
+        points = merge(max(points, other), min(points, other), min(points, other) >= of_face)
+      end associate
       pieces_b = self%pieces(b + 1)
     end if
     points = points*min(self%pieces(a + 1)*pieces_b, self%pieces(a + 1) + pieces_b + more_pairs)

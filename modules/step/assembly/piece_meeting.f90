@@ -3,7 +3,7 @@ module gravier_piece_meeting
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
-  use gravier_shape_library, only: of_face
+  use gravier_shape_library, only: face_points
   use gravier_manifold, only: manifold_t
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_polygon_manifold, find_shortest_way
   use gravier_polyhedron_pair, only: find_polyhedron_manifold
@@ -45,7 +45,7 @@ contains
       call find_polygon_manifold(room%a, room%b, alert, manifold)
     else
       call place_in_space(a, b, pair)
-      call find_polyhedron_manifold(piece_a, piece_b, pair, alert, of_face, manifold)
+      call find_polyhedron_manifold(piece_a, piece_b, pair, alert, max(face_points(piece_a), face_points(piece_b)), manifold)
       call turn_manifold(a%axes, manifold)
     end if
   end subroutine meet_pieces

@@ -2,7 +2,7 @@
 module gravier_shape_contacts
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t, list_faces
-  use gravier_shape_library, only: shape_library_t, of_face
+  use gravier_shape_library, only: shape_library_t, face_points
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_plane_manifold
@@ -232,7 +232,7 @@ contains
       call find_polygon_contacts(work%room%a, work%near, alert, work%facets)
     else
       call turn_facets(a%axes, work%near, work%turned)
-      call find_polyhedron_contacts(piece, a%radius, work%turned, alert, of_face, work%facets)
+      call find_polyhedron_contacts(piece, a%radius, work%turned, alert, face_points(piece), work%facets)
     end if
     do k = 1, work%facets%n
       if (nd == 3 .and. size(piece%vertex, 2) > 1) call turn_manifold(a%axes, work%facets%manifold(k))
@@ -259,7 +259,7 @@ contains
     do k = 1, 3
       turned(k) = sum(a%axes(:, k)*normal)
     end do
-    call find_halfspace_manifold(piece, a%radius, turned, distance, alert, of_face, manifold)
+    call find_halfspace_manifold(piece, a%radius, turned, distance, alert, face_points(piece), manifold)
     call turn_manifold(a%axes, manifold)
   end subroutine touch_plane
 
