@@ -4,7 +4,7 @@
     python3 drivers/studies/study_masonry.py [--quick] [--parts NAME...] [--out DIR]     15 minutes on one core, quick 1 minute
 
 The parts are slopes, prisms, sliding and toppling, rocking, overhangs, wedges, arches, walls that lean, dominoes, long rests,
-landings, and scenes turned and mirrored. It prints a row an oracle with what was measured, expected and accepted, and ends with
+a pile of stones, landings, and scenes turned and mirrored. It prints a row an oracle with what was measured, expected and accepted, and ends with
 status 1 where one is out of its bounds. With --out it leaves DIR/masonry.md, the table, and DIR/masonry.csv."""
 import argparse
 import sys
@@ -13,13 +13,14 @@ from pathlib import Path
 
 import masonry_blocks as blocks
 import masonry_motion as motion
+import masonry_pile
 import masonry_walls as walls
 from oracle_table import Table, say
 from study_support import write_measured
 
 PARTS = {"slope": blocks.slope, "prisms": blocks.prisms, "map": blocks.slide_topple, "rocking": blocks.rocking,
          "overhang": blocks.overhang, "wedge": blocks.wedge, "arch": walls.arches, "tilt": walls.tilts, "dominoes": motion.dominoes,
-         "rest": walls.rest, "landing": motion.landing, "turned": motion.invariance}
+         "rest": walls.rest, "pile": masonry_pile.pile, "landing": motion.landing, "turned": motion.invariance}
 
 
 def main():
