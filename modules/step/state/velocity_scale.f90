@@ -232,14 +232,17 @@ contains
     end do
   end subroutine add_grains
 
-  !> The square of the velocity that has the energy of the spin of a grain [m^2/s^2].
+  !> The square of the velocity that has the energy of the spin of a grain, without what attractions add to it [m^2/s^2].
   pure real(dp) function square_of_spin(sub, b, nd) result(square)
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: b, nd
     real(dp) :: spin(size(sub%v_free, 1))
+    integer :: d
 
-    spin(:) = sub%v_free(:, b)
-    spin(1:nd) = 0.0_dp
+    spin(:) = 0.0_dp
+    do d = nd + 1, size(spin)
+      spin(d) = sub%free_velocity(d, b)
+    end do
     square = sub%inverse_mass(1, b)*mass_product(sub%inverse_mass(:, b), spin, spin)
   end function square_of_spin
 
