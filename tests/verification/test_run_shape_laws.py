@@ -1,5 +1,6 @@
 """Laws of contact and boundaries with shapes: rebounds, slopes, cohesion, bonds; segments, rectangles, drums, moving planes, glued bodies,
 outlets, periods; piles that sleep."""
+import os
 import unittest
 
 import numpy as np
@@ -77,6 +78,43 @@ class ShapeLaws(RunTestCase):
                     history = run.history()
                     np.testing.assert_allclose(history["kinetic_energy"], history["kinetic_energy"][0], rtol=2e-4)
                     self.assertLess(np.mean(history["iterations"]), 20)
+
+    def test_bonded_blocks_on_boundaries(self):
+        """Blocks with strong bonds to a boundary stay where they are or go with it, at the default settings: a block that hangs on a wall, a block on a
+        segment that turns, and a tower on a plate that swings, whose bonds would have to bear 753 N. A wall far away that moves changes nothing."""
+        dimension = 2
+        bond = {"materials": "m", "kind": "bonded", "bond_friction": 1.0, "bond_distance": 1e-4}
+        far = {"shape": "segment", "point": [70.0, 0.0], "end": [70.0, 0.1], "velocity": [0.01, 0.0], "material": "m"}
+        library = "shape block\npolygon -0.05 -0.05  0.05 -0.05  0.05 0.05  -0.05 0.05\n"
+
+        def play(title, rows, boundaries, strength, steps, **scene):
+            return self.play(title, dimension, rows, boundaries, {"scene": scene, "time": {"steps": steps, "step": 1e-3},
+                                                                  "material": [{"name": "m", "density": 1000.0}], "law": [{**bond, "bond_strength": strength}], "output": {"every": steps},
+                                                                  "solver": {"method": "nlgs", "criterion": None, "tolerance": None}}, library=library)
+
+        wall = {"shape": "plane", "point": [0.0, 0.0], "normal": [1.0, 0.0], "material": "m"}
+        for count, strength in ((1, 1e8), (3, 1e7), (3, 1e9)):
+            for boundaries in ([wall], [wall, far]):
+                with self.subTest("hangs", count=count, strength=strength, far=len(boundaries) > 1):
+                    rows = [body("block", [0.05 + 0.1 * k, 0.0], 0.0) for k in range(count)]
+                    run = play(f"hangs {count} {strength} {len(boundaries)}", rows, boundaries, strength, 500, gravity=[0.0, -G])
+                    np.testing.assert_allclose(self.track(run, place=count - 1)[-1], [0.1 * count - 0.05, 0.0], atol=1e-4)
+        for strength in (1e4, 1e6):
+            with self.subTest("turns", strength=strength):
+                hub = {"shape": "segment", "point": [0.05, -0.05], "end": [0.05, 0.05], "rotation": 5.0, "pivot": [0.0, 0.0], "material": "m"}
+                run = play(f"turns {strength}", [body("block", [0.1, 0.0], 0.0, [0.0, 0.5], 5.0)], [hub], strength, 150, gravity=[0.0, 0.0])
+                np.testing.assert_allclose(self.track(run)[-1], 0.1 * np.array([np.cos(0.75), np.sin(0.75)]), atol=1e-5)
+        tower = [body("block", [0.0, 0.05 + 0.1 * k], 0.0) for k in range(3)]
+        times = np.linspace(0.0, 0.401, 402)
+        swing = [[float(time), float(np.sin(20.0 * time)), 0.0, 0.0] for time in times]
+        for strength in (1200.0, 2000.0):
+            with self.subTest("swings", strength=strength):
+                title = f"swings {strength}"
+                os.makedirs(self.here(title), exist_ok=True)
+                write(f"{self.here(title)}/swing.csv", "time,vx,vy,omega\n" + "".join(",".join(map(repr, row)) + "\n" for row in swing))
+                plate = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0], "table": "swing.csv", "material": "m"}
+                run = play(title, tower, [plate], strength, 400, gravity=[0.0, -G])
+                np.testing.assert_allclose(self.track(run, place=2)[-1], [(1.0 - np.cos(8.0)) / 20.0, 0.25], atol=1e-3)
 
     def test_flush_joints(self):
         """A block slides over the joint of two blocks side by side, loose on a plane or glued, of two segments or two rectangles: with or without

@@ -62,6 +62,8 @@ module gravier_check_schedule
     real(dp), private :: progress = 0.0_dp
     real(dp), private :: last_figure = huge(1.0_dp), pause = 0.0_dp
     integer, private :: skips = 0, last_check = 0
+    !> the iteration from which on the estimate is believed, if the last check came before
+    integer, private :: believed_from = 0
     !> the first iteration that a check of accelerated sweeps may follow before it is due
     integer, private :: earliest = early_check
   contains
@@ -100,6 +102,7 @@ contains
     if (self%chooses .and. (calls .or. (method%acceleration%on .and. iteration >= self%earliest))) &
       & calls = is_worth_a_check(self, problem, method, iteration, goal, reference, history)
     if (self%settled .and. iteration == self%trusted) calls = calls .or. .not. self%ratio > 0.0_dp
+    calls = calls .or. iteration == self%believed_from
   end function check_schedule_calls
 
   !> Whether the sweeps of the iteration before speak for a check. Collective.
@@ -190,17 +193,20 @@ contains
   end subroutine check_schedule_take_ratio
 
   !> A check was made after an iteration, and found this figure.
-  pure subroutine check_schedule_note_check(self, iteration, figure, goal, is_known)
+  pure subroutine check_schedule_note_check(self, iteration, figure, goal, is_known, believed_from)
     class(check_schedule_t), intent(inout) :: self
     integer, intent(in) :: iteration
     real(dp), intent(in) :: figure, goal
     !> false where the figure is a bound, because the estimate was not asked for
     logical, intent(in) :: is_known
+    !> iteration from which on the estimate is believed, which a check follows; 0 where it is now
+    integer, intent(in) :: believed_from
 
+    self%believed_from = believed_from
     if (iteration == 0) then
       ! before the estimate is trusted only what is nearly at rest may meet the goal
       if (self%by_estimate .and. .not. figure <= near_the_goal*goal) self%earliest = max(early_check, self%trusted)
-    else
+    else if (believed_from == 0) then
       ! the ratio of a bound tells less than that of a solve before
       if (self%progress > 0.0_dp .and. (is_known .or. self%ratio_of < solve_before)) then
         self%ratio = figure/self%progress

@@ -263,7 +263,7 @@ contains
     call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
-    call state%schedule%note_check(report%iterations, report%figure, report%goal, has_estimate(state))
+    call state%schedule%note_check(report%iterations, report%figure, report%goal, has_estimate(state), state%velocity%believed_from)
     state%checking = state%checking + clock() - start
     call stop_timer(phase_check)
   end subroutine check

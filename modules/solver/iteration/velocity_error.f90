@@ -69,8 +69,11 @@ module gravier_velocity_error
     !> whether a body moves where nearly all are at rest, and the error is not known to be small against that
     logical, private :: is_restless = .false.
     !> whether E may be too small: nearly all bodies are at rest, contacts attract or impulses came from a pass over layers, and
-    !> waves cannot have crossed all bodies yet. Iterations made at the last `assess`, and before the last `begin_anew`.
+    !> waves cannot have crossed all bodies yet; the same of what a boundary moves through bonds. Iterations made at the last
+    !> `assess`, and before the last `begin_anew`.
     logical, private :: is_early = .false.
+    !> the iteration from which on E is believed of what a boundary moves through bonds, 0 where it is now
+    integer :: believed_from = 0
     integer, private :: iterations = 0, begun_at = 0
     !> what finds Y
     type(test_impulses_t) :: tests
@@ -154,6 +157,7 @@ contains
     self%has_followed = .false.
     self%is_restless = .false.
     self%is_early = .false.
+    self%believed_from = 0
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -277,7 +281,8 @@ contains
     early = 0
     if (self%begun_at > 0) early = self%begun_at + self%levels%most_depth
     if (problem%attracts) early = self%begun_at + 2*self%levels%most_depth
-    self%is_early = self%iterations < early .and. self%bound_by_rest <= slow*problem%error_scale
+    self%is_early = self%iterations < early .and. (problem%carries .or. self%bound_by_rest <= slow*problem%error_scale)
+    self%believed_from = merge(early, 0, self%is_early .and. problem%carries)
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then

@@ -125,6 +125,8 @@ module gravier_contact_problem
     logical :: rest_is_admissible = .false.
     !> whether some law of the scene attracts, so that contacts may hold bodies by traction
     logical :: attracts = .false.
+    !> whether some boundary moves and bonds carry its motion from body to body
+    logical :: carries = .false.
     !> sum of r_n times the shift and, where rest is admissible, |V|_M^2 of the bodies in contact, by the last `residual` [J]
     real(dp) :: shift_power = 0.0_dp, kinetic = 0.0_dp
     !> largest |R^d| of a body in contact [N s] and largest free speed of one [m/s]: the scales of the two errors

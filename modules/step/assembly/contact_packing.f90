@@ -31,9 +31,6 @@ module gravier_contact_packing
     integer :: c = 0, q = 0, g = 0, f = 0, p = 0, i = 0, j = 0, b = 0
     !> what its law makes of the step
     type(contact_terms_t) :: terms
-    !> No boundary moves. Bodies that one moves, and that start from forces of 0, would seem to be solved before their motion has
-    !> come through them: few of their contacts see it.
-    logical :: rests = .false.
   end type packed_t
 
   !> gap over the radius of the candidate that is rounding
@@ -79,10 +76,6 @@ contains
       allocate (start(kernels%nv, 0))
     end if
     before = -1
-    this%rests = .true.
-    do c = 1, size(boundaries)
-      this%rests = this%rests .and. .not. (boundaries(c)%present .and. boundaries(c)%is_moved())
-    end do
     do c = 1, found%n
       call find_packed(view, found, c, this)
       sub%source(c) = this%p
@@ -267,7 +260,7 @@ contains
       if (allocated(sub%attraction)) then
         sub%attraction(q, g) = h*terms%attraction
         ! what touches, but for rounding, may start as if its attraction did nothing: the bodies press against each other by as much
-        if (this%rests .and. .not. terms%free_gap > rounded_gap*view%bodies%radius(i)) sub%impulse(q, 1, g) = h*terms%attraction
+        if (.not. terms%free_gap > rounded_gap*view%bodies%radius(i)) sub%impulse(q, 1, g) = h*terms%attraction
       end if
       if (kernels%nc == 1) return
       sub%hot(q, row%friction, g) = terms%friction

@@ -31,7 +31,7 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     type(interface_statistics_t), intent(out) :: figures
     type(contact_list_t) :: found
-    integer :: s
+    integer :: s, b
 
     problem%comm => decomposition%comm
     problem%kernels = kernels
@@ -54,6 +54,10 @@ contains
     call find_interface(decomposition, problem)
     call count_figures(decomposition, halo, problem, figures)
     problem%attracts = physics%laws%attracts
+    problem%carries = .false.
+    do b = 1, merge(size(decomposition%boundaries), 0, physics%laws%breaks)
+      problem%carries = problem%carries .or. decomposition%boundaries(b)%present .and. decomposition%boundaries(b)%is_moved()
+    end do
     if (problem%attracts) call problem%load_attraction()
     call find_scales(problem)
     call stop_timer(phase_interface)

@@ -353,7 +353,7 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(.not. calls(schedule, sim%problem, method, 9), "no check before it is due")
     call check(calls(schedule, sim%problem, method, 10), "the first one is made")
-    call schedule%note_check(10, 0.05_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(10, 0.05_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     ! the ratio is 5 from here on
     call set_progress(sim%problem, 2.3e-4_dp)
     call check(calls(schedule, sim%problem, method, 20), "1.15 times the goal is expected")
@@ -371,7 +371,7 @@ contains
     call set_progress(sim%problem, 1.0e-2_dp)
     call check(calls(schedule, sim%problem, method, 210), "and so with momentum")
     ! the figure has fallen, the ratio is 4, and no pause is longer than 0.06 of the iterations made
-    call schedule%note_check(210, 0.04_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(210, 0.04_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     call set_progress(sim%problem, 2.0e-4_dp)
     call check(.not. calls(schedule, sim%problem, method, 223), "0.8 times the goal is expected, but too soon")
     call check(calls(schedule, sim%problem, method, 225) .eqv. chooses, "and late enough")
@@ -393,17 +393,23 @@ contains
     schedule%by_estimate = .true.
     schedule%trusted = 4
     call set_progress(sim%problem, 1.0e-4_dp)
-    call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(0, 2.9e-3_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     call check(calls(schedule, sim%problem, method, 2), "nearly at rest: a check before the estimate is trusted")
-    call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(0, 3.1e-3_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     call check(.not. calls(schedule, sim%problem, method, 3), "far from rest: none before it is trusted")
     call check(calls(schedule, sim%problem, method, 4), "the first when it is trusted")
+    call set_progress(sim%problem, 1.0_dp)
+    call schedule%take_ratio(10.0_dp)
+    call schedule%note_check(4, 2.0_dp, 1.0e-3_dp, is_known=.true., believed_from=7)
+    call check_close(schedule%mean_ratio(0.0_dp), 10.0_dp, 0.0_dp, "what is not believed tells nothing of what follows")
+    call check(.not. calls(schedule, sim%problem, method, 6), "far from the goal, no check")
+    call check(calls(schedule, sim%problem, method, 7), "the first when the estimate is believed")
     ! the ratio is 15 from here on
-    call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(4, 1.5e-3_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     call set_progress(sim%problem, 6.0e-5_dp)
     call check(.not. calls(schedule, sim%problem, method, 7), "0.9 times the goal is expected, but too soon")
     call check(calls(schedule, sim%problem, method, 8), "and late enough")
-    call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(40, 9.0e-4_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     do iteration = 41, 60
       if (calls(schedule, sim%problem, method, iteration)) exit
     end do
@@ -423,7 +429,7 @@ contains
     schedule%by_estimate = .true.
     schedule%trusted = 4
     schedule%settled = .true.
-    call schedule%note_check(0, 1.0_dp, 1.0e-3_dp, is_known=.false.)
+    call schedule%note_check(0, 1.0_dp, 1.0e-3_dp, is_known=.false., believed_from=0)
     ! by half of this, 50 times the goal is expected
     call set_progress(problem, 1.0e-1_dp)
     call check(calls(schedule, problem, method, 4), "a settled scene is checked as soon as the estimate is trusted")
@@ -432,9 +438,9 @@ contains
     call check_equal(first_call(schedule, problem, method), 20, "1.4 times the goal is expected: the second regular check")
     call set_progress(problem, 0.9e-4_dp)
     call check_equal(first_call(schedule, problem, method), 4, "the goal is expected")
-    call schedule%note_check(4, 1.0_dp, 1.0e-3_dp, is_known=.false.)
+    call schedule%note_check(4, 1.0_dp, 1.0e-3_dp, is_known=.false., believed_from=0)
     call check_close(schedule%mean_ratio(0.0_dp), 10.0_dp, 0.0_dp, "a bound tells less than the solve before")
-    call schedule%note_check(4, 1.8e-3_dp, 1.0e-3_dp, is_known=.true.)
+    call schedule%note_check(4, 1.8e-3_dp, 1.0e-3_dp, is_known=.true., believed_from=0)
     call check_close(schedule%mean_ratio(0.0_dp), 20.0_dp, 1.0e-12_dp, "an estimate tells more")
     call check_close(schedule%mean_ratio(5.0_dp), 10.0_dp, 1.0e-12_dp, "what is left to the next solve is a mean")
     call set_progress(problem, 0.7e-4_dp)
