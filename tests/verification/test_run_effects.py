@@ -31,6 +31,28 @@ class Rolling(SmallScene):
         spin_of = record.spin[:, 0, :] @ ([-1.0] if dimension == 2 else [0.0, 1.0, 0.0])
         return record, record.velocity[:, 0, 0], spin_of, angle
 
+    def test_on_glued_grains(self):
+        """A grain that rolls down a glued grain, from 0.3 rad beside its top: the lever of rolling resistance is R_i R_j/(R_i + R_j)."""
+        def check(dimension):
+            rolling, begin, small, steps, step = 0.2, 0.3, 0.01, 60, 5e-4
+            for radius in (0.01, 0.03):
+                length, share = small + radius, rolling * radius / (small + radius)
+                zero, place = np.zeros(dimension), np.zeros(dimension)
+                place[0], place[-1] = length * np.sin(begin), length * np.cos(begin)
+                record = self.play(f"rolls {dimension} {radius}", [Grain(zero, radius=radius, group=1), Grain(place, radius=small, mass=2.0)],
+                                   [{"shape": "grains", "group": 1}], -G * np.eye(dimension)[-1], steps,
+                                   scene={"friction": 0.9, "rolling_friction": rolling}, time={"step": step})
+                # (1 + k) L a'' = g sin a - mu_r R*/R (g cos a - L a'^2), by the midpoint rule
+                angle, rate, parts = begin, 0.0, 20000
+                h = steps * step / parts
+                for _ in range(parts):
+                    angle += 0.5 * h * rate
+                    rate += h * (G * np.sin(angle) - share * (G * np.cos(angle) - length * rate**2)) / ((1 + INERTIA[dimension]) * length)
+                    angle += 0.5 * h * rate
+                self.verify(f"{dimension}D grain on a glued one of radius {radius}", "speed [m/s]", np.linalg.norm(record.velocity[-1, 1]), length * rate,
+                            5e-3 * length * rate)
+        self.both(check)
+
     def test_incline(self):
         """It rolls iff tan(angle) > rolling friction, then with a = g (sin - mu_r cos)/(1 + I/(m R^2)), without sliding."""
         def check(dimension):

@@ -243,7 +243,7 @@ contains
     real(dp), intent(in) :: h
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: reach
+    real(dp) :: reach, radius_j
 
     associate (q => this%q, g => this%g, i => this%i, j => this%j, row => kernels%row, terms => this%terms)
       sub%hot(q, 1:kernels%nd, g) = found%normal(:, this%f)
@@ -266,7 +266,10 @@ contains
       sub%hot(q, row%friction, g) = terms%friction
       if (row%shift_t > 0) sub%hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g) = 0.0_dp
       if (row%rolling_radius == 0) return
-      sub%hot(q, row%rolling_radius, g) = rolling_radius(sub%hot(q, row%lever_i, g), sub%hot(q, row%lever_j, g))
+      ! glued grains roll on free ones as grains do, though they have no lever
+      radius_j = 0.0_dp
+      if (j > 0) radius_j = view%bodies%radius(j)
+      sub%hot(q, row%rolling_radius, g) = rolling_radius(view%bodies%radius(i), radius_j)
       sub%hot(q, row%rolling_friction, g) = terms%rolling_friction
       if (kernels%nd == 3) sub%hot(q, row%pivoting_friction, g) = terms%pivoting_friction
     end associate
