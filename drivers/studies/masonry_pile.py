@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from masonry_scene import GRAVITY
 from study_support import BINARIES, read_history, run, states
 
 #: random hulls of twelve corners
@@ -15,7 +16,7 @@ random_hull 2 12 1 1 1
 shape long
 random_hull 3 12 1.4 1 0.7
 """
-RADIUS, BOX, GRAVITY, DENSITY = 0.01, 0.1, 9.81, 2500.0
+RADIUS, BOX, DENSITY = 0.01, 0.1, 2500.0
 
 
 def pile(table, quick):

@@ -5,7 +5,7 @@ module gravier_shape_library
   use gravier_piece_width, only: half_width_of
   implicit none
   private
-  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, face_points
+  public :: body_shape_t, shape_library_t, point_counts_t, boundary_number, face_points, most_of_face
 
   !> stands for a boundary in the place of the number of a shape
   integer, parameter :: boundary_number = -1

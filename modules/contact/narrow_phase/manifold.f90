@@ -1,12 +1,13 @@
 !> The contacts of two convex pieces.
 module gravier_manifold
   use gravier_kinds, only: dp
+  use gravier_shape_library, only: most_of_face
   implicit none
   private
   public :: manifold_t, most_points, feature_base
 
   !> points that a manifold can hold
-  integer, parameter :: most_points = 16
+  integer, parameter :: most_points = most_of_face
   !> features of a piece (vertices, edges or faces) have numbers from 0 to feature_base - 1, so that two make a key below 2^30
   integer, parameter :: feature_base = 32768
 

@@ -357,7 +357,7 @@ contains
     type(kernels_t), intent(in) :: kernels
     type(physics_t), intent(in) :: physics
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: velocity(kernels%nd), t(3), s(3), spin(3), allowed
+    real(dp) :: velocity(kernels%nd), t(3), s(3), spin(3), shift
     type(bonded_groups_t) :: groups
     type(contact_place_t) :: place
     type(packed_t) :: this
@@ -377,8 +377,9 @@ contains
         call find_bond_velocity(view, boundaries, physics, this%p, place, velocity)
       end if
       associate (contact => sub%hot(this%q, :, this%g), row => kernels%row)
-        allowed = merge(-huge(1.0_dp), contact(row%shift), joins)
-        contact(row%shift) = max(allowed, -sum(velocity*contact(1:kernels%nd)))
+        shift = -sum(velocity*contact(1:kernels%nd))
+        if (.not. joins) shift = max(shift, contact(row%shift))
+        contact(row%shift) = shift
         if (kernels%nd == 2) then
           contact(row%shift_t) = contact(2)*velocity(1) - contact(1)*velocity(2)
         else

@@ -37,7 +37,6 @@ contains
     real(dp), intent(in) :: alert
     type(room_t), intent(inout) :: room
     type(manifold_t), intent(inout) :: manifold
-
     type(placed_pair_t) :: pair
 
     if (size(piece_a%vertex, 1) == 2) then
