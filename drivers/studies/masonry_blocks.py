@@ -187,7 +187,7 @@ def prism_cases(quick):
     """Prisms and directions: name, base, height, direction of the fall, tangent of the angle at which it topples: where the
     vertical through the centre leaves the base."""
     cases = []
-    for n, height in ((4, 2.0), (6, 3.0), (8, 3.0), (12, 3.0), (16, 3.0)):
+    for n, height in ((4, 2.0), (6, 3.0), (8, 3.0), (12, 3.0), (16, 3.0), (24, 3.0), (48, 3.0)):
         for share in (0.0, 0.3, 0.5, 1.0) if not quick else (0.0, 0.5):
             # from the middle of a side to a corner
             direction = -0.5 * np.pi + share * np.pi / n
@@ -197,10 +197,14 @@ def prism_cases(quick):
     cases.append(("cube", rectangle(2.0, 2.0), 2.0, 0.0, 1.0))
     for k in (1, 2):
         cases.append((f"12 sides, side {k}", regular(12), 3.0, (k / 6.0 - 0.5) * np.pi, 2.0 / 3.0))
-    # a pair of pieces keeps 16 points: of more corners some are left out
+    # a pair of pieces keeps 64 points: of more corners some are left out
     for k in range(2):
-        cases.append((f"24 sides, 16 points, side {k}", regular(24), 3.0, (k / 12.0 - 0.5) * np.pi, 2.0 / 3.0))
+        cases.append((f"96 sides, 64 points, side {k}", regular(96), 3.0, (k / 48.0 - 0.5) * np.pi, 2.0 / 3.0))
     return cases
+
+
+#: faces of 48 corners near their limit: sweeps end after 200 000 at residuals of 1e-8 to 1e-7
+BY_NEWTON = {**EXACT, "method": "newton"}
 
 
 def prisms_stand(cases):
@@ -216,7 +220,7 @@ def prisms_stand(cases):
             scene.put(ramp, rotated(lean, np.array([0.0, 0.0, -4.0])) + [*at, 0.0], lean, fixed=True)
             scene.put(scene.prism(base, height), rotated(lean, np.array([0.0, 0.0, 0.5 * height])) + [*at, 0.0],
                       times(lean, quaternion([0.0, 0.0, 1.0], -direction)))
-        found = scene.run()
+        found = scene.run(solver=BY_NEWTON)
         return [found.speed([2 * k + 1]) < MOVES for k in range(len(cases))]
 
     return stand
@@ -229,14 +233,14 @@ def prisms(table, quick):
     # points that a face lacks make a prism topple early
     angles = bisect_all(prisms_stand(cases), 0.5 * exact, exact + 2.5e-3, 2.0e-5)
     for (name, *_), angle, expected in zip(cases, angles, exact):
-        accepted = None if "16 points" in name else 1.0e-4
+        accepted = None if "64 points" in name else 1.0e-4
         table.add("prisms", f"toppling angle on a block, {name}", angle, expected, accepted=accepted)
     for name, base, height, direction, tangent in cases[:11:2] if quick else cases[:-2]:
         def stands(angle):
             scene = Scene(3, friction=3.0, gravity=GRAVITY * np.array([np.sin(angle), 0.0, -np.cos(angle)]))
             scene.plane([0.0, 0.0, 1.0])
             scene.put(scene.prism(base, height), [0.0, 0.0, 0.5 * height], quaternion([0.0, 0.0, 1.0], -direction))
-            return scene.run().speed() < MOVES
+            return scene.run(solver=BY_NEWTON).speed() < MOVES
         theta = np.arctan(tangent)
         angle = bisect(stands, 0.5 * theta, theta + 2.5e-3, 2.0e-5)
         table.add("prisms", f"toppling angle on a plane, {name}", angle, theta, None, 1.0e-4)

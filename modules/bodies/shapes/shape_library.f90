@@ -11,7 +11,7 @@ module gravier_shape_library
   integer, parameter :: boundary_number = -1
   !> points in which two pieces touch at most, by the vertices of the one that has fewer: a vertex, an edge or a face in the plane,
   !> and a face in space, which has more if it has more corners
-  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8, most_of_face = 16
+  integer, parameter :: of_vertex = 1, of_edge = 2, of_face = 8, most_of_face = 64
   !> pairs of pieces that two bodies touch with at most, besides as many as both have pieces
   integer, parameter :: more_pairs = 4
 

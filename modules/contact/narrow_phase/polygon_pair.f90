@@ -86,6 +86,7 @@ contains
     real(dp) :: normal(2), on_a(2), on_b(2), distance, range
     integer :: vertex_a, vertex_b
 
+    manifold%point(3, 1:2) = 0.0_dp
     range = a%rounding + b%rounding + alert
     call find_separation(a, b, range, normal, distance)
     if (distance > range) return
@@ -125,6 +126,7 @@ contains
     real(dp) :: gap, ends(2, 2)
     integer :: vertex, k, first
 
+    manifold%point(3, 1:2) = 0.0_dp
     vertex = extreme_vertex(a, -1.0_dp, normal)
     gap = sum(normal*a%vertex(:, vertex)) - level - a%rounding
     if (gap > alert) return

@@ -10,7 +10,7 @@ program test_contact_patch
   type(frame_t), parameter :: frame = frame_t([1.0_dp, 2.0_dp, 3.0_dp], [0.0_dp, 0.0_dp, 1.0_dp], [1.0_dp, 0.0_dp, 0.0_dp], &
     & [0.0_dp, 1.0_dp, 0.0_dp])
   real(dp), parameter :: alert = 0.1_dp
-  type(patch_point_t) :: points(40)
+  type(patch_point_t) :: points(2*most_points)
   integer :: n
 
   call MPI_Init()
@@ -90,11 +90,11 @@ contains
     integer :: k
 
     n = 0
-    do k = 1, 20
+    do k = 1, most_points
       call add(real(k, dp), 0.0_dp, 0.0_dp, k)
     end do
     do k = 1, 4
-      call add(5.0_dp + 0.1_dp*k, 0.0_dp, merge(-0.01_dp, 0.0_dp, k == 3), 20 + k)
+      call add(5.0_dp + 0.1_dp*k, 0.0_dp, merge(-0.01_dp, 0.0_dp, k == 3), most_points + k)
     end do
     call fill_manifold(frame, 1.0_dp, 1.0e-5_dp, most_points, n, points, manifold)
     call check_equal(manifold%n, most_points, "as many points as a manifold holds")
