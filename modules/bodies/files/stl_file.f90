@@ -36,13 +36,13 @@ contains
       n = (len(lines%text) - head)/record
       allocate (points(3, 3*n))
       call read_binary(path, lines%text, points, error)
-    else if (lower(lines%text(1:min(5, len(lines%text)))) == "solid") then
+    else if (lower(lines%text(1:min(5, len(lines%text)))) == "solid" .and. index(lines%text, achar(0)) == 0) then
       n = count_vertices(lines%text)/3
       allocate (points(3, 3*n))
       call read_ascii(path, lines, points, error)
     else
-      call raise(error, status_input, path//": no STL file: it does not begin with ""solid"", and its length is not "// &
-        & "that of its number of triangles")
+      call raise(error, status_input, path//": no STL file: it is no text that begins with ""solid"", and its length of "// &
+        & to_text(len(lines%text))//" bytes is not that of a binary file"//length_of(lines%text))
     end if
     if (allocated(error)) return
     if (n == 0) call raise(error, status_input, path//": no triangle")
@@ -63,6 +63,16 @@ contains
     if (len(text) < head) return
     is_binary = word_at(text, head - 3)*record + head == len(text)
   end function is_binary
+
+  !> What the length of a binary file with so many triangles as it tells is, in words.
+  pure function length_of(text) result(words)
+    character(len=*), intent(in) :: text
+    character(len=:), allocatable :: words
+
+    words = ""
+    if (len(text) < head) return
+    words = " of "//to_text(word_at(text, head - 3))//" triangles, "//to_text(word_at(text, head - 3)*record + head)
+  end function length_of
 
   !> The whole number of four bytes, the lowest first.
   pure integer(i8) function word_at(text, place) result(word)

@@ -132,7 +132,7 @@ contains
     end do
   end subroutine check_sides
 
-  !> No face is without area, the volume is above 0, and all points are behind all faces.
+  !> Each face has an area and all of its corners in one plane, the volume is above 0, and all points are behind all faces.
   subroutine check_planes(surface, flat, message)
     type(sharp_polyhedron_t), intent(in) :: surface
     real(dp), intent(in) :: flat
@@ -147,8 +147,13 @@ contains
         message = "face "//to_text(f)//" has no area"
         return
       end if
+      do v = surface%face_first(f), surface%face_first(f + 1) - 1
+        if (abs(height_of(surface%face_vertex(v))) <= flat) cycle
+        message = "face "//to_text(f)//" is not plane: its corners do not lie in one plane"
+        return
+      end do
       do v = 1, size(surface%vertex, 2)
-        height = dot_product(surface%face_normal(:, f), surface%vertex(:, v)) - surface%face_offset(f)
+        height = height_of(v)
         if (height > flat .and. outside == 0) outside = f
         if (height < -flat .and. inside == 0) inside = f
       end do
@@ -160,6 +165,15 @@ contains
     else if (outside > 0) then
       message = "the body is not convex: a point lies in front of face "//to_text(outside)
     end if
+
+  contains
+
+    !> The height of a point above the plane of face f.
+    pure real(dp) function height_of(point)
+      integer, intent(in) :: point
+      height_of = dot_product(surface%face_normal(:, f), surface%vertex(:, point)) - surface%face_offset(f)
+    end function height_of
+
   end subroutine check_planes
 
 end module gravier_closed_surface
