@@ -24,7 +24,8 @@ module gravier_time_stepper
   use gravier_pair_laws, only: conclude_pairs
   use gravier_contact_springs, only: conclude_springs, measure_springs
   use gravier_velocity_scale, only: velocity_scale_t
-  use gravier_body_motion, only: move_to_middle, drive, count_fast, move_to_end
+  use gravier_body_motion, only: move_to_middle, drive, move_to_end
+  use gravier_fast_grains, only: count_fast
   use gravier_velocity_return, only: take_velocities
   use gravier_boundary_loads, only: sum_boundary_impulses, take_boundary_velocities
   use gravier_cell_drive, only: cell_drive_t, take_cell
@@ -405,9 +406,8 @@ contains
     real(dp) :: free_grains
 
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
-    call self%tally%add_step(figures%max_overlap, figures%interface_statistics, &
-      & shifts/self%overlap_allowed > rounded_shift, shifts/free_grains, &
-      & self%physics%h*self%balance%speeds/free_grains)
+    call self%tally%add_step(figures%max_overlap, figures%interface_statistics, shifts/self%overlap_allowed > rounded_shift, &
+      & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic

@@ -189,6 +189,7 @@ contains
           text = text//": the results are not those of the contact law"
         end if
       end if
+      if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%restarted) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text

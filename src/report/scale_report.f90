@@ -147,7 +147,7 @@ contains
 
     text = "the radius"
     if (simulation%effects%shapes) text = "half of the thickness"
-    text = "in step "//to_text(step)//" the way of "//counted(fast, "grain")//" is longer than "//text
+    text = "in step "//to_text(step)//" the way of "//counted(fast, "grain")//", or of a boundary towards it, is longer than "//text
   end function fast_warning
 
   !> That the step does not resolve the collisions of the stiffest compliant contacts.

@@ -393,9 +393,10 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: text
 
-    if (simulation%fast > 0) call log%line("warning     "//to_text(simulation%fast)//" times a grain moved by more than "// &
+    if (simulation%fast > 0) call log%line("warning     "//to_text(simulation%fast)// &
+      & " times a grain, or a boundary towards it, moved by more than "// &
       & trim(merge("half of its thickness", "its radius           ", simulation%effects%shapes))// &
-      & " in a step, and may have passed through others: use a smaller &time step", error)
+      & " in a step, and may have passed through something: use a smaller &time step", error)
     if (simulation%largest_overlap/worth_a_warning > simulation%overlap_allowed) call log%line("warning     overlaps of up to "// &
       & to_text(simulation%largest_overlap, 3)//" m, far beyond the overlap_allowed of "//to_text(simulation%overlap_allowed, 3)// &
       & " m: the solves leave errors that add up; use a smaller &time step or &solver "//goal_name(simulation), error)

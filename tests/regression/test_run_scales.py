@@ -165,6 +165,48 @@ class Scales(RunTestCase):
         line = self.assert_heeded(LATTICE, "radii of the smallest grain", drum)
         self.figures(line, rf"boundary 'drum' moves by {NUMBER} radii", 0.2 * 10.0 * 1e-3 / RADIUS)
 
+    def test_boundaries_that_may_pass_through_grains(self):
+        """Whatever moves it, a boundary that goes towards grains by more than their radius in a step is counted where it reaches them,
+        and the log says so; one that goes along its surface, or by less, is not."""
+        row = "".join(f"{k + 1},{0.03 * k!r},%s0,{RADIUS}\n" for k in range(5))
+        flat = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../row.csv", "density": DENSITY, "gravity": [0.0, 0.0]},
+                "time": {"step": 1e-3, "steps": 30}, "output": {"directory": "results"}}
+        space = merged(flat, {"scene": {"dimension": 3, "bodies_file": "../space.csv", "gravity": [0.0, 0.0, 0.0]}})
+        ram = {"name": "ram", "shape": "segment", "point": [-0.1, -0.41], "end": [0.3, -0.41]}
+        plate = {"name": "ram", "shape": "rectangle", "point": [-0.1, -0.1, -0.41], "edge_a": [0.4, 0.0, 0.0],
+                 "edge_b": [0.0, 0.2, 0.0]}
+        mesh = {"name": "ram", "shape": "mesh", "file": "../ram.csv"}
+        write(self.here("row.csv"), "id,x,y,radius\n" + row.replace("%s", ""))
+        write(self.here("space.csv"), "id,x,y,z,radius\n" + row.replace("%s", "0,"))
+        write(self.here("ram.csv"), "x,y\n-0.1,-0.41\n0.06,-0.41\n0.3,-0.41\n")
+        push = {"free": [False, True], "mass": 1.0, "force": [0.0, 4e4], "velocity": [0.0, 0.0]}
+        cases = {
+            "segment": (flat, {**ram, "velocity": [0.0, 30.0]}, True),
+            "segment by a force": (flat, {**ram, **push}, True),
+            "mesh": (flat, {**mesh, "velocity": [0.0, 30.0]}, True),
+            "rectangle": (space, {**plate, "velocity": [0.0, 0.0, 30.0]}, True),
+            "segment that turns": (flat, {**ram, "point": [-0.2, -0.1], "end": [-0.2, -0.5], "pivot": [-0.2, 0.0], "rotation": [100.0]}, True),
+            "segment in small steps": (merged(flat, {"time": {"step": 1e-4, "steps": 300}}), {**ram, "velocity": [0.0, 30.0]}, False),
+            "segment along itself": (flat, {**ram, "point": [-0.9, -0.011], "end": [0.3, -0.011], "velocity": [30.0, 0.0]}, False),
+            "segment far away": (flat, {**ram, "point": [1.1, -0.41], "end": [1.5, -0.41], "velocity": [0.0, 30.0]}, False),
+            "drum": (flat, {"name": "drum", "shape": "circle", "point": [0.06, 0.0], "radius": 0.08, "rotation": [400.0]}, False),
+        }
+        for title, (case, boundary, counts) in cases.items():
+            with self.subTest(title):
+                found = []
+                for ranks in (1, 2):
+                    run = run_case(merged(case, {"boundary": boundary, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}}),
+                                   ranks, self.here(f"{title} {ranks}".replace(" ", "_")))
+                    self.assert_status(run, 0)
+                    found.append(run.history()["fast"].sum())
+                self.assertEqual(found[0], found[1])
+                if counts:
+                    self.assertGreaterEqual(found[0], 5)
+                    self.assertRegex(run.stdout, r"warning     in step \d+ the way of \d grains, or of a boundary towards it, is longer than the radius")
+                    self.assertRegex(run.stdout, rf"finished    .*; {found[0]:.0f} times something moved too far for the step; results in")
+                else:
+                    self.assertEqual(found[0], 0)
+
     def test_pressure(self):
         line = self.assert_heeded(SHEAR, "under the pressure on", {"boundary": [{**SHEAR["boundary"][0], "velocity": [0.0, 0.0], "pressure": 1e5}]})
         self.figures(line, rf"h sqrt\(P/rho\)/d = {NUMBER} under the pressure on 'lid'", 1e-3 * math.sqrt(1e5 / DENSITY) / (2 * RADIUS))

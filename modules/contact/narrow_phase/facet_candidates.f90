@@ -7,7 +7,7 @@
 !> facets have it.
 module gravier_facet_candidates
   use gravier_kinds, only: dp
-  use gravier_facet, only: near_facets_t, find_foot, longest_side
+  use gravier_facet, only: near_facets_t, find_foot, find_facet_normal, longest_side
   implicit none
   private
   public :: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
@@ -19,6 +19,8 @@ module gravier_facet_candidates
   real(dp), parameter :: equal = 1.0e-9_dp
   !> gaps between facets are rounding of the file where they are less than this part of the rounding of a piece
   real(dp), parameter :: narrow_gap = 1.0e-3_dp
+  !> rise of a facet, in parts of its longest side, that rounding could make
+  real(dp), parameter :: rounding_of_rise = 1.0e-10_dp
 
   !> A place where a piece may touch a facet.
   type :: facet_candidate_t
@@ -45,6 +47,7 @@ module gravier_facet_candidates
     procedure :: add => facet_candidates_add
     procedure :: sort => facet_candidates_sort
     procedure :: drop_hidden => facet_candidates_drop_hidden
+    procedure :: is_hidden => facet_candidates_is_hidden
     procedure :: drop_repeated => facet_candidates_drop_repeated
   end type facet_candidates_t
 
@@ -123,36 +126,57 @@ contains
     type(near_facets_t), intent(in) :: near
     !> of tolerance_for [m]
     real(dp), intent(in) :: tolerance
-    !> rise at and below which a facet counts as flat, in parts of its longest side
+    !> sine of the slope of a facet at and below which it counts as flat
     real(dp), intent(in) :: slack
-    integer :: k, l
+    integer :: k
 
     do k = 2, self%n
       associate (item => self%item(self%order(k)))
-        do l = 1, k - 1
-          item%dropped = rises(near%corner(:, :, self%item(self%order(l))%place), item, tolerance, slack)
-          if (item%dropped) exit
-        end do
+        item%dropped = self%is_hidden(k, near, item%foot, tolerance, slack)
       end associate
     end do
   end subroutine facet_candidates_drop_hidden
 
-  !> Whether a facet has the point of a candidate and rises from there along its normal.
-  pure logical function rises(corner, item, tolerance, slack)
+  !> Whether a facet that is nearer to the piece rises from a point of a candidate.
+  pure logical function facet_candidates_is_hidden(self, k, near, foot, tolerance, slack) result(hidden)
+    !> sorted
+    class(facet_candidates_t), intent(in) :: self
+    !> place of the candidate in the order
+    integer, intent(in) :: k
+    type(near_facets_t), intent(in) :: near
+    !> point of its facet; and of tolerance_for [m]
+    real(dp), intent(in) :: foot(3), tolerance
+    !> sine of the slope of a facet at and below which it counts as flat
+    real(dp), intent(in) :: slack
+    integer :: l
+
+    hidden = .false.
+    do l = 1, k - 1
+      hidden = rises(near%corner(:, :, self%item(self%order(l))%place), self%item(self%order(k))%normal, foot, tolerance, slack)
+      if (hidden) return
+    end do
+  end function facet_candidates_is_hidden
+
+  !> Whether a facet has a point and rises from there along a normal.
+  pure logical function rises(corner, normal, point, tolerance, slack)
     !> (3, 2 or 3) [m]
     real(dp), intent(in), contiguous :: corner(:, :)
-    type(facet_candidate_t), intent(in) :: item
+    !> unit vector, and the point [m]
+    real(dp), intent(in) :: normal(3), point(3)
     real(dp), intent(in) :: tolerance, slack
-    real(dp) :: height
+    real(dp) :: height, of_facet(3)
     integer :: c
 
-    height = -huge(1.0_dp)
-    do c = 1, size(corner, 2)
-      height = max(height, dot_product(item%normal, corner(:, c) - item%foot))
-    end do
     rises = .false.
+    height = 0.0_dp
+    do c = 1, size(corner, 2)
+      height = max(height, dot_product(normal, corner(:, c) - point))
+    end do
     if (height <= tiny(1.0_dp)) return
-    if (height > slack*longest_side(corner)) rises = has_point(corner, item%foot, tolerance)
+    if (height <= rounding_of_rise*longest_side(corner)) return
+    ! the slope, and not the rise over the longest side: a facet may be long and narrow
+    call find_facet_normal(corner, of_facet)
+    if (norm2(normal - dot_product(normal, of_facet)*of_facet) > slack) rises = has_point(corner, point, tolerance)
   end function rises
 
   !> Whether a facet has a point.

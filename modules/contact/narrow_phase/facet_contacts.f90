@@ -15,8 +15,8 @@ module gravier_facet_contacts
   private
   public :: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
 
-  !> Rise of a facet, in parts of its length, at and below which it does not hide a point: rounding for balls. Pieces with sides
-  !> also keep points that they reach by a small turn.
+  !> Sine of the slope of a facet at and below which it does not hide a point: rounding for balls. Pieces with sides also keep
+  !> points that they reach by a small turn.
   real(dp), parameter :: slack_of_balls = 1.0e-10_dp, slack_of_pieces = 1.0e-3_dp
   !> sine of the angle between the normals of a contact and of a facet within which they are one
   real(dp), parameter :: aligned = 1.0e-8_dp
@@ -120,6 +120,7 @@ contains
     type(placed_piece_t) :: line
     type(facet_candidate_t) :: candidate
     type(manifold_t) :: manifold(near%n)
+    real(dp) :: foot(3)
     integer :: k, c
 
     found%n = 0
@@ -137,7 +138,8 @@ contains
       candidate%normal(:) = manifold(k)%normal
       ! of two points the middle: the ends of a common part may lie on facets beside this one
       do c = 1, manifold(k)%n
-        candidate%foot(:) = candidate%foot + (manifold(k)%point(:, c) - 0.5_dp*manifold(k)%gap(c)*manifold(k)%normal)/manifold(k)%n
+        call find_foot_of(manifold(k), c, foot)
+        candidate%foot(:) = candidate%foot + foot/manifold(k)%n
       end do
       call found%candidates%add(candidate)
     end do
@@ -145,10 +147,60 @@ contains
     call found%candidates%drop_hidden(near, tolerance_for(near, piece%rounding), slack_of_pieces)
     do k = 1, found%candidates%n
       associate (item => found%candidates%item(found%candidates%order(k)))
-        if (.not. item%dropped) call found%add(near%number(item%place), manifold(item%place))
+        if (item%dropped) cycle
+        call drop_joint(found%candidates, k, near, tolerance_for(near, piece%rounding), manifold(item%place))
+        if (manifold(item%place)%n > 0) call found%add(near%number(item%place), manifold(item%place))
       end associate
     end do
   end subroutine find_polygon_contacts
+
+  !> Where point `c` of a manifold lies on the facet [m].
+  pure subroutine find_foot_of(manifold, c, foot)
+    type(manifold_t), intent(in) :: manifold
+    integer, intent(in) :: c
+    real(dp), intent(out) :: foot(3)
+
+    foot(:) = manifold%point(:, c) - 0.5_dp*manifold%gap(c)*manifold%normal
+  end subroutine find_foot_of
+
+  !> Drop what a side that leans over a facet has at a joint of a hollow wall. Where the normal is that of the side, the facet
+  !> touches it with one of its ends. If the next facet hides that end, a side that passes over the joint would be stopped there.
+  !> What stays is a corner of the piece over the facet, which stands on it once the side turns.
+  pure subroutine drop_joint(candidates, k, near, tolerance, manifold)
+    type(facet_candidates_t), intent(in) :: candidates
+    !> place of the candidate in the order
+    integer, intent(in) :: k
+    type(near_facets_t), intent(in) :: near
+    !> of tolerance_for [m]
+    real(dp), intent(in) :: tolerance
+    !> of the candidate
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: foot(3, 2), nearer_end(3), other_end(3)
+    integer :: nearer, other
+
+    if (manifold%n < 2) return
+    associate (item => candidates%item(candidates%order(k)))
+      if (item%lies_along) return
+      call find_foot_of(manifold, 1, foot(:, 1))
+      call find_foot_of(manifold, 2, foot(:, 2))
+      if (abs(manifold%gap(2) - manifold%gap(1)) <= slack_of_pieces*norm2(foot(:, 2) - foot(:, 1))) return
+      nearer = merge(1, 2, manifold%gap(1) < manifold%gap(2))
+      other = 3 - nearer
+      nearer_end(:) = near%corner(:, 1, item%place)
+      other_end(:) = near%corner(:, 2, item%place)
+      if (norm2(foot(:, nearer) - other_end) < norm2(foot(:, nearer) - nearer_end)) then
+        nearer_end(:) = other_end
+        other_end(:) = near%corner(:, 1, item%place)
+      end if
+    end associate
+    if (.not. candidates%is_hidden(k, near, nearer_end, tolerance, slack_of_pieces)) return
+    manifold%n = 0
+    if (norm2(foot(:, other) - other_end) <= tolerance) return
+    manifold%n = 1
+    manifold%point(:, 1) = manifold%point(:, other)
+    manifold%gap(1) = manifold%gap(other)
+    manifold%key(1) = manifold%key(other)
+  end subroutine drop_joint
 
   !> The contacts of a piece in space that is no ball, in its axes.
   pure subroutine find_polyhedron_contacts(piece, radius, near, alert, most, found)

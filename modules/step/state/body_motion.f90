@@ -1,7 +1,6 @@
 !> Motion of grains and boundaries over a step: to the middle, by drives, and to the end (gravier_motion has the rule).
 module gravier_body_motion
-  use gravier_kinds, only: dp, i8
-  use gravier_periodic, only: gradient_times
+  use gravier_kinds, only: dp
   use gravier_time_table, only: time_table_t
   use gravier_orientation, only: turn_orientation
   use gravier_motion, only: predict_position, advance_position
@@ -12,7 +11,7 @@ module gravier_body_motion
   use gravier_boundary_loads, only: carry_glued, set_glued_velocities
   implicit none
   private
-  public :: move_to_middle, drive, count_fast, move_to_end
+  public :: move_to_middle, drive, move_to_end
 
   !> part of a step by which times that are written in decimals are before those of steps
   real(dp), parameter :: rounded = 1.0e-6_dp
@@ -103,37 +102,6 @@ contains
       end associate
     end do
   end subroutine drive
-
-  !> Count the grains that move by more than half of their thickness in a step, a ball by more than its radius, beside a cell that
-  !> moves: they may pass through others unseen. Collective.
-  integer(i8) function count_fast(decomposition, physics) result(fast)
-    type(decomposition_t), intent(in) :: decomposition
-    type(physics_t), intent(in) :: physics
-    integer(i8) :: counts(1)
-    real(dp) :: gradient(3, 3), centre(3), v(decomposition%nd), place(decomposition%nd), carried(decomposition%nd)
-    integer :: s, k, nd
-
-    nd = decomposition%nd
-    gradient(:, :) = 0.0_dp
-    if (decomposition%period%moves) gradient(:, :) = decomposition%period%gradient()
-    centre(:) = decomposition%period%centre()
-    counts(:) = 0
-    do s = 1, size(decomposition%owned)
-      associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          v(:) = owned%velocity(1:nd, k)
-          if (decomposition%period%moves) then
-            place(:) = owned%position(:, k) - centre(1:nd)
-            carried(:) = gradient_times(gradient, place)
-            v(:) = v - carried
-          end if
-          if (physics%h**2*sum(v**2) > decomposition%figures%half_thickness_of(owned, k)**2) counts(1) = counts(1) + 1
-        end do
-      end associate
-    end do
-    call decomposition%comm%sum_counts(counts)
-    fast = counts(1)
-  end function count_fast
 
   !> q_{i+1} of grains and boundaries.
   subroutine move_to_end(decomposition, physics, theta, some_glued)

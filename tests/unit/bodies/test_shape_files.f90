@@ -171,8 +171,8 @@ contains
     type(error_t), allocatable :: error
     character(len=:), allocatable :: text
 
-    call refuse_stl("", "a.stl: no STL file: it is no text that begins with ""solid"", and its length of 0 bytes is not that of "// &
-      & "a binary file")
+    call refuse_stl("", "a.stl: no STL file: it is no text that begins with ""solid"", and its length of 0 bytes is not "// &
+      & "that of a binary file")
     call refuse_stl("solid"//n//"endsolid"//n, "a.stl: no triangle")
     text = ascii_of(1)
     call refuse_stl(text(1:index(text, "endloop") - 6), "a.stl: line 6: the file ends within a facet")
@@ -183,8 +183,8 @@ contains
       & "a.stl: line 6: ""vertices"", but facet, outer loop, vertex, endloop, endfacet or endsolid was expected")
     call write_binary("b.stl", 5)
     call read_stl("b.stl", found, first, corner, error)
-    call check_message(error, "b.stl: no STL file: it is no text that begins with ""solid"", and its length of 284 bytes is "// &
-      & "not that of a binary file of 5 triangles, 334")
+    call check_message(error, "b.stl: no STL file: it is no text that begins with ""solid"", and its length of 284 bytes "// &
+      & "is not that of a binary file of 5 triangles, 334")
   end subroutine test_refused_stl
 
 end program test_shape_files

@@ -10,7 +10,8 @@ program test_time_stepper
   use gravier_solve, only: solve_report_t, solve_converged, solve_stagnated, solve_diverged
   use gravier_repartition, only: repartition_rule_t, repartition_is_due
   use gravier_load_areas, only: facing_area, find_load_areas
-  use gravier_body_motion, only: move_to_middle, move_to_end, drive, count_fast
+  use gravier_body_motion, only: move_to_middle, move_to_end, drive
+  use gravier_fast_grains, only: count_fast
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
   use gravier_interface, only: interface_statistics_t
   use gravier_run_tally, only: run_tally_t
