@@ -313,7 +313,8 @@ class Shapes(RunTestCase):
         solid = {"scene": {"dimension": 3, "friction": 0.0, "gravity": [0, 0, 0]}}
         spring = {"scene": {"friction": 0.0, "gravity": [0, 0]}, "material": [{"name": "m"}],
                   "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e5}]}
-        fast, deep = "in step 1 the way of 1 grain is longer than half of the thickness", "overlap by a quarter of a thickness and more"
+        fast = "in step 1 the way of 1 grain, or of a boundary towards it, is longer than half of the thickness"
+        deep = "overlap by a quarter of a thickness and more"
         for name, shape, bodies, more, steps, words in (
                 ("slab", "box 1 1 0.01", head + "-15,\n", merged(solid, {"scene": {"restitution": 0.5}}), (1e-3, 20), (fast, deep)),
                 ("plank", "box 0.12 0.024 0.008", head + "-4,\n", solid, (5e-3, 15), (fast, deep)),

@@ -10,7 +10,7 @@ module gravier_facet_candidates
   use gravier_facet, only: near_facets_t, find_foot, find_facet_normal, longest_side
   implicit none
   private
-  public :: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
+  public :: facet_candidate_t, facet_candidates_t, tolerance_for, has_point, rises
 
   !> places nearer to each other than this part of the rounding, with normals that differ by less, are one
   real(dp), parameter :: same = 1.0e-6_dp

@@ -7,14 +7,15 @@ module gravier_shape_contacts
   use gravier_manifold, only: manifold_t, feature_base
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_plane_manifold
   use gravier_polyhedron_pair, only: find_halfspace_manifold
-  use gravier_facet, only: near_facets_t
+  use gravier_facet, only: near_facets_t, find_facet_normal
   use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
   use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
   use gravier_surface_velocity, only: add_image_velocity
-  use gravier_piece_meeting, only: room_t, meet_pieces
+  use gravier_piece_meeting, only: room_t, nearest_t, meet_pieces, find_nearest_points
   use gravier_clear_path, only: clear_path
+  use gravier_wall_joints, only: is_in_joint, keep_corners
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
@@ -22,6 +23,9 @@ module gravier_shape_contacts
 
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
+  !> distance, over the rounding of a piece, within which points of two boundaries are one; sine of the slope of a boundary at and
+  !> below which it is level
+  real(dp), parameter :: one_place = 1.0e-3_dp, level = 1.0e-3_dp
 
   !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for pieces where bodies are and where they
   !> go, and for facets.
@@ -74,11 +78,11 @@ contains
     work%alert = decomposition%rule%alert_distance
     i = view%list%candidate(p)
     j = view%list%antagonist(p)
-    associate (bodies => view%bodies, alert => decomposition%rule%alert_distance)
+    associate (bodies => view%bodies)
       if (j > 0) then
         way(:) = bodies%position(:, j) - bodies%position(:, i)
         if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), 1, way)
-        if (norm2(way) > bodies%radius(i) + bodies%radius(j) + alert) return
+        if (norm2(way) > bodies%radius(i) + bodies%radius(j) + work%alert) return
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
         antagonist%centre(1:decomposition%nd) = way
@@ -87,8 +91,7 @@ contains
         call touch_body(decomposition%shapes, candidate, antagonist, work, points)
       else
         call see_body(bodies, i, candidate)
-        call touch_boundary(decomposition%shapes, candidate, bodies%position(:, i), decomposition%boundaries(-j), alert, work, &
-          & points)
+        call touch_boundary(decomposition, candidate, bodies%position(:, i), -j, work, points)
       end if
       call points%merge_near(same*bodies%radius(i))
     end associate
@@ -147,13 +150,56 @@ contains
   end subroutine touch_piece
 
   !> The points with a boundary: a plane, a surface that ends at straight edges, one that is round, or one of facets.
-  subroutine touch_boundary(shapes, a, centre, boundary, alert, work, points)
+  subroutine touch_boundary(decomposition, a, centre, j, work, points)
+    type(decomposition_t), intent(in) :: decomposition
+    type(seen_body_t), intent(in) :: a
+    !> of the body (nd) [m]
+    real(dp), intent(in), contiguous :: centre(:)
+    !> number of the boundary
+    integer, intent(in) :: j
+    type(shape_work_t), intent(inout) :: work
+    type(pair_points_t), intent(inout) :: points
+
+    associate (boundary => decomposition%boundaries(j))
+      if (.not. boundary%present) return
+      if (boundary%is_faceted()) then
+        call touch_mesh(decomposition%shapes, a, centre, boundary, work, points)
+      else
+        call touch_surface(decomposition, a, centre, j, work, points)
+      end if
+    end associate
+  end subroutine touch_boundary
+
+  !> The points with a boundary of facets.
+  subroutine touch_mesh(shapes, a, centre, boundary, work, points)
     type(shape_library_t), intent(in) :: shapes
     type(seen_body_t), intent(in) :: a
     !> of the body (nd) [m]
     real(dp), intent(in), contiguous :: centre(:)
     type(boundary_t), intent(in) :: boundary
-    real(dp), intent(in) :: alert
+    type(shape_work_t), intent(inout) :: work
+    type(pair_points_t), intent(inout) :: points
+    integer :: k
+
+    call boundary%find_facets(centre, a%radius + work%alert, work%near)
+    do k = 1, n_pieces(shapes, a)
+      if (work%near%n == 0) exit
+      if (a%shape == 0) then
+        call touch_facets(work%ball, a, k, size(centre), work%alert, work, points)
+      else
+        call touch_facets(shapes%shape(a%shape)%piece(k), a, k, size(centre), work%alert, work, points)
+      end if
+    end do
+  end subroutine touch_mesh
+
+  !> The points with a plane, a surface that ends at straight edges, or one that is round.
+  subroutine touch_surface(decomposition, a, centre, j, work, points)
+    type(decomposition_t), intent(in) :: decomposition
+    type(seen_body_t), intent(in) :: a
+    !> of the body (nd) [m]
+    real(dp), intent(in), contiguous :: centre(:)
+    !> number of the boundary
+    integer, intent(in) :: j
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
     type(convex_piece_t) :: sheet
@@ -161,33 +207,22 @@ contains
     real(dp) :: normal(size(centre)), place(size(centre)), distance, corners(3, 4)
     integer :: k, n
 
-    if (.not. boundary%present) return
-    if (boundary%is_faceted()) then
-      call boundary%find_facets(centre, a%radius + alert, work%near)
-      do k = 1, n_pieces(shapes, a)
-        if (work%near%n == 0) exit
-        if (a%shape == 0) then
-          call touch_facets(work%ball, a, k, size(centre), alert, work, points)
-        else
-          call touch_facets(shapes%shape(a%shape)%piece(k), a, k, size(centre), alert, work, points)
-        end if
-      end do
-      return
-    end if
-    call boundary%locate(centre, distance, normal)
-    if (distance - a%radius > alert) return
-    call boundary%find_corners(centre, n, corners)
-    if (n > 0) then
-      call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
-      place(:) = centre + seen_sheet%centre(1:size(centre))
-      call boundary%last_velocity_at(place, seen_sheet%velocity(1:size(centre)))
-      seen_sheet%spin(:) = boundary%last_spin
-    end if
-    do k = 1, n_pieces(shapes, a)
+    associate (boundary => decomposition%boundaries(j))
+      call boundary%locate(centre, distance, normal)
+      if (distance - a%radius > work%alert) return
+      call boundary%find_corners(centre, n, corners)
+      if (n > 0) then
+        call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
+        place(:) = centre + seen_sheet%centre(1:size(centre))
+        call boundary%last_velocity_at(place, seen_sheet%velocity(1:size(centre)))
+        seen_sheet%spin(:) = boundary%last_spin
+      end if
+    end associate
+    do k = 1, n_pieces(decomposition%shapes, a)
       if (a%shape == 0) then
         call touch(work%ball)
       else
-        call touch(shapes%shape(a%shape)%piece(k))
+        call touch(decomposition%shapes%shape(a%shape)%piece(k))
       end if
     end do
 
@@ -196,21 +231,41 @@ contains
     subroutine touch(piece)
       type(convex_piece_t), intent(in) :: piece
       type(manifold_t) :: manifold
-      integer :: number(2)
 
-      if (boundary%is_plane()) then
-        call touch_plane(piece, a, normal, distance, alert, work%room%a, manifold)
-        call points%add(manifold, k, 1)
-      else if (n > 0) then
-        number(1) = k
-        number(2) = 1
-        call touch_piece(piece, sheet, a, seen_sheet, number, work, points)
-      else
-        call touch_round_surface(piece, a, centre, boundary, alert, k, points)
-      end if
+      associate (boundary => decomposition%boundaries(j))
+        if (boundary%is_plane()) then
+          call touch_plane(piece, a, normal, distance, work%alert, work%room%a, manifold)
+        else if (n > 0) then
+          call meet_pieces(piece, sheet, a, seen_sheet, work%alert, work%room, manifold)
+          call leave_joints(piece, manifold)
+          if (work%step > 0.0_dp) call clear_path(piece, sheet, work%step, a, seen_sheet, work%ahead, manifold)
+        else
+          call touch_round_surface(piece, a, centre, boundary, work%alert, k, points)
+          return
+        end if
+      end associate
+      call points%add(manifold, k, 1)
     end subroutine touch
 
-  end subroutine touch_boundary
+    !> Where a side leans over the sheet and touches its edge, it is not stopped there if the wall goes on upwards.
+    subroutine leave_joints(piece, manifold)
+      type(convex_piece_t), intent(in) :: piece
+      type(manifold_t), intent(inout) :: manifold
+      type(nearest_t) :: near
+      real(dp) :: of_sheet(3), edge(size(centre)), tolerance
+
+      if (manifold%n == 0) return
+      call find_facet_normal(corners(:, 1:min(n, 3)), of_sheet)
+      if (norm2(manifold%normal - dot_product(manifold%normal, of_sheet)*of_sheet) <= level) return
+      call find_nearest_points(piece, sheet, a, seen_sheet, work%room, near)
+      if (near%overlap) return
+      tolerance = one_place*a%radius*piece%rounding
+      edge(:) = centre + near%point(1:size(centre)) - 0.5_dp*(near%gap + a%radius*piece%rounding)*near%normal(1:size(centre))
+      if (is_in_joint(decomposition%boundaries, j, edge, manifold%normal, tolerance, level)) &
+        & call keep_corners(corners(:, 1:n), tolerance, level, manifold)
+    end subroutine leave_joints
+
+  end subroutine touch_surface
 
   !> The points of a piece with the facets near its body.
   subroutine touch_facets(piece, a, number, nd, alert, work, points)
