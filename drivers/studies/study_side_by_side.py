@@ -3,7 +3,7 @@
 
     ./gravier study side_by_side EXAMPLE... [--out DIR] --pylmgc90 PATH [--quick] [--steps N] [--settle M]
 
-EXAMPLE is a directory with a DATBOX and a command script; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
+EXAMPLE is a directory with a command script and a DATBOX, or a script of the pre-processor that makes one; PATH is the directory that holds the package pylmgc90 as built with its module chipy.
 LMGC90 runs the command script of the example as it is, in a copy, for N steps (100, quick 20). Gravier runs what gravier_import
 makes of the DATBOX. With --settle LMGC90 makes M steps first, and its last state with its forces is the DATBOX of both: what is at
 rest there has to stay at rest here. Gravier then runs once more without these forces. A body counts as moved that is farther than
@@ -28,7 +28,7 @@ from study_support import BINARIES, ENVIRONMENT, plt, read_history, sized, state
 
 import gravier
 from one_line import OneLineParser
-from study_lmgc90 import convert
+from study_lmgc90 import convert, generate
 
 
 #: a body has moved that is farther from its start than this part of its size, after so many steps
@@ -107,7 +107,10 @@ def by_lmgc90(example, place, options, steps):
                        env={**os.environ, "PYTHONPATH": str(options.pylmgc90.resolve()), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
     text = (place / "said.txt").read_text(encoding="latin-1")
     if not (place / "record.npz").exists():
-        sys.exit(f"study_side_by_side: LMGC90 did not run {example.name}: {(text.strip().splitlines() or ['nothing said'])[-1]}")
+        said = text.strip().splitlines() or ["nothing said"]
+        # the last line that tells of an error: LMGC90 ends with advice on packages
+        wrong = [line for line in said if re.search(r"error|not present|not found", line, re.IGNORECASE)]
+        sys.exit(f"study_side_by_side: LMGC90 did not run {example.name}: {(wrong or said)[-1].strip()}")
     record = dict(np.load(place / "record.npz"))
     record["iterations"] = [int(number) for number in re.findall(r"NLGS(?:3D)? ITERATION\s*:\s*(\d+)", text)]
     return record
@@ -155,6 +158,10 @@ def ways_here(folder, free):
 def compare(example, options):
     name = example.name
     ours, theirs = options.out / name / "gravier", options.out / name / "lmgc90"
+    if not (example / "DATBOX/BODIES.DAT").exists():
+        example, lacks = generate(example, options.out / "generated" / name, options.pylmgc90)
+        if lacks:
+            sys.exit(f"study_side_by_side: {name} does not run: {lacks}")
     if options.settle:
         example = settled(example, options.out / name / "settled", options)
     record = by_lmgc90(example, theirs, options, options.steps)
@@ -247,9 +254,9 @@ def accepted(rows, settled_before):
         name = row["example"]
         table.add(f"{name}: mass in LMGC90 over mass here", row["mass_ratio"], 0.99, 1.09,
                   f"the same densities; {page}: 1.08 of clusters")
-        table.near(f"{name}: mean force on the ground, here over LMGC90",
-                   row["mean_force_on_ground_over_weight_gravier"] / row["mean_force_on_ground_over_weight_lmgc90"], 1.0, 0.05,
-                   f"{page}: 1.00 to 1.03; a twentieth")
+        # over the weight that each program gives the bodies; before anything has reached the ground both forces are 0
+        table.near(f"{name}: mean force on the ground over the weight, here less LMGC90", row["mean_force_on_ground_over_weight_gravier"] -
+                   row["mean_force_on_ground_over_weight_lmgc90"] / row["mass_ratio"], 0.0, 0.05, f"{page}: up to 0.03; a twentieth of the weight")
         if np.isfinite(row["forces_found"]):
             table.add(f"{name}: contacts with forces that the first step finds", row["forces_found"], 0.99, 1.0,
                       f"{page}: 1108 of 1116, or all")

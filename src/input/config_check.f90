@@ -11,7 +11,7 @@ module gravier_config_check
   use gravier_method_registry, only: features_of, quoted_names, that_decompose
   use gravier_config_keys, only: choices_text
   use gravier_config_slots, only: slot_t, slot_of, group_count, belongs, chosen_word
-  use gravier_config_report, only: report_t, expect, miss, is_given, shown_text, label
+  use gravier_config_report, only: report_t, expect, miss, is_given, reaches, shown_text, label
   use gravier_config_check_boundary, only: check_boundaries, check_contact
   use gravier_config_check_laws, only: check_materials, check_laws
   use gravier_config_check_sample, only: check_sample
@@ -174,6 +174,8 @@ contains
                   "cell_strain_rate", error, "0 along the axes of "//shown_text(report, "scene", "cell_pressure"))
       call expect(report, .not. any(abs(scene%cell_shear_stress) > 0.0_dp .and. abs(scene%cell_shear_rate) > 0.0_dp), "scene", &
                   "cell_shear_rate", error, "0 for the components of "//shown_text(report, "scene", "cell_shear_stress"))
+      call expect(report, reaches(report, "scene", "gravity", scene%dimension), "scene", "gravity", error, &
+                  to_text(scene%dimension)//" numbers")
       call expect(report, scene%gravity_table == "" .or. .not. is_given(report, "scene", "gravity"), "scene", "gravity", error, &
                   "a scene without it where "//shown_text(report, "scene", "gravity_table")//" replaces it")
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_distance_given, "scene", "alert_distance", error)

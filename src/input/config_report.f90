@@ -6,7 +6,7 @@ module gravier_config_report
   use gravier_config_keys, only: find_group, find_key, expected_text
   implicit none
   private
-  public :: given_t, report_t, expect, expect_own_name, miss, is_given, shown_text, label, ordinal
+  public :: given_t, report_t, expect, expect_own_name, miss, is_given, reaches, shown_text, label, ordinal
 
   !> Whether a key of the table is in a group of the file, and how.
   type :: given_t
@@ -86,6 +86,17 @@ contains
     character(len=*), intent(in) :: group, key
     is_given = any(report%given(find_key(group, key), report%instance)%entries)
   end function is_given
+
+  !> Whether a list is not given at all, or up to an entry at least, which would keep its default otherwise.
+  pure logical function reaches(report, group, key, entry)
+    type(report_t), intent(in) :: report
+    character(len=*), intent(in) :: group, key
+    integer, intent(in) :: entry
+
+    associate (given => report%given(find_key(group, key), report%instance))
+      reaches = given%entries(entry) .or. .not. any(given%entries)
+    end associate
+  end function reaches
 
   !> A key as the file has it, or its name when it is not given.
   pure function shown_text(report, group, key) result(text)

@@ -203,7 +203,7 @@ contains
       case ("friction")
         value = loop%between_grains%friction
       case ("kinetic_energy")
-        value = figures%kinetic_energy
+        value = simulation%balance%kinetic
       case ("max_overlap")
         value = figures%max_overlap
       case ("residual")

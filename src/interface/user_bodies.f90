@@ -4,7 +4,7 @@ module gravier_user_bodies
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
   use gravier_sorting, only: argsort
-  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text
+  use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text, sharpest, far_text
   use gravier_motion, only: grain_mass
   use gravier_inflow, only: placed_t, is_clear
   use gravier_config_laws, only: density_of
@@ -85,8 +85,10 @@ contains
         if (bodies%radius(k) > simulation%decomposition%rule%largest_radius) call refuse("radius "//to_text(bodies%radius(k), 7)// &
           & " m: expected at most "//to_text(simulation%decomposition%rule%largest_radius, 7)// &
           & " m, the largest radius of the scene at its start")
-        if (abs(bodies%mass(k)) > 0.0_dp .and. .not. is_size(bodies%mass(k))) call refuse("mass: expected "//size_text)
+        if (.not. abs(bodies%mass(k)) <= 0.0_dp .and. .not. is_size(bodies%mass(k))) call refuse("mass: expected "//size_text)
         if (.not. all(is_bounded(bodies%position(:, k)))) call refuse("position: expected "//bounded_text)
+        if (any(abs(bodies%position(:, k)) > sharpest*bodies%radius(k))) call refuse("position: expected at most "// &
+          & to_text(sharpest*bodies%radius(k), 4)//" m, "//far_text)
         if (.not. all(is_bounded(bodies%velocity(:, k)))) call refuse("velocity: expected "//bounded_text)
         if (bodies%material(k) < 1 .or. bodies%material(k) > most) call refuse("material "//to_text(bodies%material(k))// &
           & ": expected a number from 1 to "//to_text(most))

@@ -87,6 +87,7 @@ FILES = [
     key("solver", "sweeps", ".true.", "expected an integer >= 1"),
     key("scene", "title", "5", "expected"),
     key("scene", "gravity", "0, 0, 0, 0", "expected at most 3"),
+    key("scene", "gravity", "-9.81", "&scene gravity = -9.81: expected 2 numbers"),
     key("scene", "friction", "0.3, 0.4", "expected a finite real number >= 0"),
     # the range
     key("time", "step", "-1e-3", "expected a finite real number > 0 (s)"),

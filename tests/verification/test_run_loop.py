@@ -62,6 +62,22 @@ with gravier.Simulation(case, quiet=True) as s:
         return {name: value for name, value in written(run.directory).items()
                 if not any(part in name for part in ("steps/30", "last_written", "input_text"))}
 
+    def test_energy_at_the_start(self):
+        """The kinetic energy is that of the bodies before the first step of a run that goes on, too."""
+        script = """
+with gravier.Simulation(case, quiet=True) as s:
+    assert s.kinetic_energy == 0.0
+    for k in range(17):
+        s.step()
+    s.checkpoint()
+    before = 0.5 * float((np.array(s.bodies.mass) * (np.array(s.bodies.velocity)**2).sum(1)).sum())
+    assert before > 0.0
+with gravier.Simulation(case, quiet=True, restart=True) as s:
+    assert s.made == 17 and abs(s.kinetic_energy - before) <= 1e-12 * before, (s.made, s.kinetic_energy, before)
+"""
+        moving = merged(HEAP, {"output": {"checkpoint_every": 0}, "scene": {"friction": 0.0, "rotation": False}})
+        self.play("energy", moving, script)
+
     def test_checkpoint_by_hand(self):
         script = """
 with gravier.Simulation(case, quiet=True) as s:

@@ -247,7 +247,7 @@ with gravier.Simulation(case, quiet=True) as s:
     gone = np.isin(s.bodies.id, [1, 17])
     out = s.sum(s.bodies.mass[gone].sum())
     s.remove([17, 1])
-    s.add_bodies([[0.03, 0.3], [0.08, 0.3]], 0.01, velocity=[[0.0, -1.0], [0.5, -1.0]], mass=[0.7, 0.0])
+    s.add_bodies([[0.03, 0.3], [0.08, 0.3]], 0.01, velocity=[[0.0, -1.0], [0.5, -1.0]], mass=[0.7, 0.9])
     s.add_bodies([[0.13, 0.3]], 0.011)
     assert s.sum(len(s.bodies)) == n, "they come with the next step"
     s.step()
@@ -257,7 +257,7 @@ with gravier.Simulation(case, quiet=True) as s:
     next_id = -s.highest(-s.bodies.id[new].min(initial=10**6))
     # boundaries have identifiers, too
     assert s.sum(new.sum()) == 3 and s.sum(s.bodies.id[new].sum()) == 3 * next_id + 3
-    expected = mass - out + 0.7 + 2500.0 * np.pi * (0.01**2 + 0.011**2)
+    expected = mass - out + 0.7 + 0.9 + 2500.0 * np.pi * 0.011**2
     assert abs(s.sum(s.bodies.mass.sum()) - expected) < 1e-12 * expected
     # 0.7 kg at -1 m/s, and a step of gravity
     first = s.bodies.id == next_id

@@ -420,7 +420,9 @@ class Simulation:
             return np.full(n, missing, float) if values is None else np.ascontiguousarray(np.broadcast_to(_reals(values, what), n))
 
         try:
-            radius, mass, material = column(radius, "radius", 0.0), column(mass, "mass", 0.0), column(material, "material", 1.0)
+            # the library takes a mass of 0 for one that was not given; NaN, which it refuses, stands for a 0 that was
+            given = None if mass is None else np.where(_reals(mass, "mass") == 0.0, np.nan, _reals(mass, "mass"))
+            radius, mass, material = column(radius, "radius", 0.0), column(given, "mass", 0.0), column(material, "material", 1.0)
         except ValueError:
             raise SimulationError(f"radius, mass, material: expected one number, or one for each of {n} bodies") from None
         if not (np.isfinite(material).all() and (material == np.round(material)).all() and (np.abs(material) < 2**31).all()):
@@ -431,7 +433,7 @@ class Simulation:
 
     def remove(self, ids):
         """Take free bodies out of the scene at the start of the next step; on all ranks alike."""
-        ids = np.atleast_1d(np.array(ids))
+        ids = np.atleast_1d(np.array(_plain(ids)))
         if ids.ndim != 1 or (ids.size and ids.dtype.kind not in "iu"):
             raise SimulationError("remove: expected identifiers, which are whole numbers")
         ids = ids.astype(np.int64)

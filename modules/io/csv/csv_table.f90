@@ -196,8 +196,11 @@ contains
       if (index(self%line(1:self%line_length), checksum_mark) /= 1) return
       letters = ""
       associate (digits => self%line(len(checksum_mark) + 1:self%line_length))
-        if (len_trim(digits) /= 16 .or. verify(trim(digits), "0123456789abcdef") /= 0) return
-        read (digits, "(z16)", iostat=stat) self%written
+        ! a seal that is damaged is that of no table
+        stat = 0
+        self%written = not(self%found)
+        if (len_trim(digits) == 16 .and. verify(trim(digits), "0123456789abcdef") == 0) &
+          & read (digits, "(z16)", iostat=stat) self%written
       end associate
       self%sealed = stat == 0
     else if (self%sealed) then
