@@ -66,6 +66,8 @@ contains
     if (simulation%restarted) then
       self%last = simulation%last_written
       call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error)
+      ! it was written after the checkpoint, where the run ended in the same step
+      if (self%file%has_last) self%last = simulation%step
       return
     end if
     run%version = version

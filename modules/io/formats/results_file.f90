@@ -64,10 +64,11 @@ module gravier_results_file
 
   !> An open results file.
   type :: results_file_t
-    private
-    type(communicator_t) :: comm
-    type(h5_file_t) :: file
-    character(len=:), allocatable :: path
+    !> after `reopen`: the file has the last step that was to stay
+    logical :: has_last = .false.
+    type(communicator_t), private :: comm
+    type(h5_file_t), private :: file
+    character(len=:), allocatable, private :: path
   contains
     procedure :: open => results_open
     procedure :: reopen => results_reopen
@@ -136,6 +137,7 @@ contains
     if (allocated(error)) return
     call self%file%read_attribute("/run", "dimension", dimension, error)
     call find_later_steps(self, last_step, witness, later, n_later, error)
+    if (.not. allocated(error)) self%has_last = self%file%exists("/steps/"//to_text(last_step))
     call self%file%leave()
     if (allocated(error)) then
       error%status = status_input

@@ -30,17 +30,18 @@ module gravier_vtkhdf_file
 
   !> An open file.
   type :: vtkhdf_file_t
-    private
-    type(communicator_t) :: comm
-    type(h5_file_t) :: file
-    character(len=:), allocatable :: path
-    type(vtk_field_t), allocatable :: field(:)
+    !> after `reopen`: the file has the last step that was to stay
+    logical :: has_last = .false.
+    type(communicator_t), private :: comm
+    type(h5_file_t), private :: file
+    character(len=:), allocatable, private :: path
+    type(vtk_field_t), allocatable, private :: field(:)
     !> place of its cells in the list of topologies, and points of a row, about
-    integer :: kind = 1, n_points = 1
+    integer, private :: kind = 1, n_points = 1
     !> rows by which the file grows, and what is written
-    integer(i8) :: chunk = 1, steps = 0, rows = 0, points = 0
+    integer(i8), private :: chunk = 1, steps = 0, rows = 0, points = 0
     !> the file has its name
-    logical :: shown = .false.
+    logical, private :: shown = .false.
   contains
     procedure :: open => vtkhdf_open
     procedure :: reopen => vtkhdf_reopen
@@ -244,6 +245,7 @@ contains
       call self%file%read_rows(step_table, 0_i8, step, error)
     end if
     if (.not. allocated(error)) self%steps = count(step <= last_step, kind=i8)
+    if (.not. allocated(error)) self%has_last = any(step == last_step)
     call find_rows(self, written, error)
     call make_tables(self, error, check=.true.)
     call self%file%leave()
