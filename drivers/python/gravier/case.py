@@ -144,6 +144,8 @@ def write_case(groups, directory):
 def run(groups, directory, ranks=1, program=None):
     """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
     directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
+    if ranks != int(ranks) or ranks < 1:
+        raise CaseError(f"ranks = {ranks}: expected a whole number above 0")
     directory = Path(directory)
     write_case(groups, directory)
     launcher = os.environ.get("MPIEXEC", "mpiexec")
