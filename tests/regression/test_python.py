@@ -128,7 +128,7 @@ class Package(RunTestCase):
             self.assertEqual((run.case["scene"][0]["friction"], run.steps[-1], status), (*point.values(), 0))
         self.assertEqual(base["scene"]["friction"], 0.3)
         with self.assertRaisesRegex(gravier.CaseError, "ranks = 0: expected a whole number above 0"):
-            gravier.run(CASE, self.here("none"), ranks=0)
+            gravier.run(base, self.here("none"), ranks=0)
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
             list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
         with self.assertRaisesRegex(gravier.CaseError, "&boundary name: stands several times"):
