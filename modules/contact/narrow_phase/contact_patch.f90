@@ -178,20 +178,21 @@ contains
     real(dp), intent(in) :: size_of_pair, same_gap
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
-    real(dp) :: depth(n), nearest, way(2)
+    real(dp) :: depth(n), square, least
     integer :: k, j, deepest, out
 
     do k = 1, n
       depth(k) = -point(k)%gap
     end do
     deepest = first_greatest(depth, same_gap)
-    nearest = huge(1.0_dp)
+    ! the square of the least distance so far, but for a difference that does not count
+    least = huge(1.0_dp)
     out = n
     do k = 2, n
       do j = 1, k - 1
-        way(:) = point(k)%place(1:2) - point(j)%place(1:2)
-        if (norm2(way) >= nearest - equal*size_of_pair) cycle
-        nearest = norm2(way)
+        square = (point(k)%place(1) - point(j)%place(1))**2 + (point(k)%place(2) - point(j)%place(2))**2
+        if (square >= least) cycle
+        least = max(sqrt(square) - equal*size_of_pair, 0.0_dp)**2
         out = merge(j, k, k == deepest)
       end do
     end do
