@@ -261,6 +261,7 @@ contains
         call raise(error, status_input, place//"expected once, but it is given twice, first as "//given%shown)
       end if
       given%entries = given%entries .or. touched
+      given%by_index = given%by_index .or. item%index /= ""
       if (allocated(given%shown)) shown = given%shown//", "//shown
       given%shown = shown
       given%value = excerpt(item%value)

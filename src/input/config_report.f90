@@ -12,6 +12,8 @@ module gravier_config_report
   type :: given_t
     !> the entries that are set
     logical :: entries(8) = .false.
+    !> some by its index
+    logical :: by_index = .false.
     !> `key = value` as the file has it; several, separated by commas, when the entries were set one by one
     character(len=:), allocatable :: shown
     !> what stands after the equal sign, of the last entry given
@@ -87,14 +89,14 @@ contains
     is_given = any(report%given(find_key(group, key), report%instance)%entries)
   end function is_given
 
-  !> Whether a list is not given at all, or up to an entry at least, which would keep its default otherwise.
+  !> Whether a list is not given at all, entry by entry, or up to an entry at least, which would keep its default otherwise.
   pure logical function reaches(report, group, key, entry)
     type(report_t), intent(in) :: report
     character(len=*), intent(in) :: group, key
     integer, intent(in) :: entry
 
     associate (given => report%given(find_key(group, key), report%instance))
-      reaches = given%entries(entry) .or. .not. any(given%entries)
+      reaches = given%entries(entry) .or. given%by_index .or. .not. any(given%entries)
     end associate
   end function reaches
 

@@ -169,6 +169,32 @@ class ShapeLaws(RunTestCase):
                     speeds = [state[2] + np.cross(state[3:], arm)[2] for state in (before, after)]
                 self.assertAlmostEqual(speeds[1], -0.5 * speeds[0], delta=1e-6)
 
+    def test_clusters_on_springs(self):
+        """A block of two pieces that falls on a plane of springs keeps its energy as a block of one piece does, while it leans to both sides:
+        the seam is one spring at any lean. In space it is two of four."""
+        library = {2: ("polygon -0.06 -0.03 0.06 -0.03 0.06 0.03 -0.06 0.03\n",
+                       "polygon -0.06 -0.03 0 -0.03 0 0.03 -0.06 0.03\npolygon 0 -0.03 0.06 -0.03 0.06 0.03 0 0.03\n"),
+                   3: ("box 0.12 0.06 0.06\n", "box 0.06 0.06 0.06 -0.03 0 0\nbox 0.06 0.06 0.06 0.03 0 0\n")}
+        for dimension, shapes in library.items():
+            for name, pieces in zip(("one", "two"), shapes):
+                with self.subTest(dimension=dimension, pieces=name):
+                    turn = 0.003 if dimension == 2 else [1.0, 0.0, -0.0015, 0.0]
+                    directory = prepare(self.here(f"springs {dimension} {name}"), dimension, [body("s", up(dimension, 0.045), turn)],
+                                        f"shape s\nrounding 0.003\n{pieces}")
+                    law = {"materials": "m", "kind": "elastic", "friction": 0.0, "normal_stiffness": 1e6 if dimension == 2 else 6e4,
+                           "spring_theta": 0.5}
+                    case = shaped_case(dimension, [{**plane(dimension), "material": "m"}],
+                                       {"scene": {"density": 1000.0, "friction": 0.0, "alert_distance": 0.01}, "material": [{"name": "m"}], "law": [law],
+                                        "time": {"step": 5e-5, "steps": 8000}, "output": {"energy": True}})
+                    run = run_case(case, 1, directory)
+                    self.assert_status(run, 0)
+                    history = run.history()
+                    energy = history["kinetic_energy"] + history["potential_energy"] + history["elastic_energy"]
+                    # the energy of the fall
+                    scale = energy[0] * 0.015 / 0.045
+                    self.assertGreater(history["elastic_energy"].max(), 0.5 * scale)
+                    self.assertLess(np.abs(energy - energy[0]).max(), (5e-3 if dimension == 2 else 2e-2) * scale)
+
     def test_slope(self):
         """A block on a slope sticks below the angle of friction, and slides as Coulomb has it above; materials have friction of their own."""
         slope, steps, h = 0.4, 50, 1e-3

@@ -74,12 +74,16 @@ contains
 
   !> Of points that are one, where pieces of a cluster meet, keep the deepest, of several the first. Where bodies overlap, the point
   !> of a corner lies half of the overlap away from it, in a direction that differs between pieces by their tilt: points that are
-  !> nearer to each other than the overlap are one, too, so that their number does not depend on the tilt.
-  pure subroutine pair_points_merge_near(points, near)
+  !> nearer to each other than the overlap are one, too. At a seam of two pieces with sides their points are apart by both roundings
+  !> once the body leans: they are one at any lean, so that neither forces at a seam nor their number jump with it.
+  pure subroutine pair_points_merge_near(points, near, seam)
     class(pair_points_t), intent(inout) :: points
     !> points of two pairs of pieces nearer to each other than this, with the same normal, are one [m]
     real(dp), intent(in) :: near
+    !> the same for two pieces of the candidate, and of the antagonist, that touch one piece; 0 of a body of one piece [m]
+    real(dp), intent(in) :: seam(2)
     logical :: dropped(points%n)
+    real(dp) :: apart
     integer :: k, l
 
     if (points%n < 2) return
@@ -89,7 +93,13 @@ contains
       do l = k + 1, points%n
         if (points%key(2, k) == points%key(2, l)) cycle
         if (dropped(k) .or. dropped(l)) cycle
-        if (maxval(abs(points%point(:, k) - points%point(:, l))) > max(near, -points%gap(k), -points%gap(l))) cycle
+        apart = max(near, -points%gap(k), -points%gap(l))
+        if (points%key(2, k)/feature_base == points%key(2, l)/feature_base) then
+          apart = max(apart, seam(2))
+        else if (mod(points%key(2, k), feature_base) == mod(points%key(2, l), feature_base)) then
+          apart = max(apart, seam(1))
+        end if
+        if (maxval(abs(points%point(:, k) - points%point(:, l))) > apart) cycle
         if (maxval(abs(points%normal(:, k) - points%normal(:, l))) > same) cycle
         dropped(l) = points%gap(l) >= points%gap(k)
         dropped(k) = .not. dropped(l)

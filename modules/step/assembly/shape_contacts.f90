@@ -23,6 +23,8 @@ module gravier_shape_contacts
 
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
+  !> largest distance of points at a seam along one axis, over the rounding of a piece
+  real(dp), parameter :: two_roundings = 2.01_dp
   !> distance, over the rounding of a piece, within which points of two boundaries are one; sine of the slope of a boundary at and
   !> below which it is level
   real(dp), parameter :: one_place = 1.0e-3_dp, level = 1.0e-3_dp
@@ -70,7 +72,7 @@ contains
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
     type(seen_body_t) :: candidate, antagonist
-    real(dp) :: way(decomposition%nd)
+    real(dp) :: way(decomposition%nd), seam(2)
     integer :: i, j
 
     points%n = 0
@@ -93,7 +95,10 @@ contains
         call see_body(bodies, i, candidate)
         call touch_boundary(decomposition, candidate, bodies%position(:, i), -j, work, points)
       end if
-      call points%merge_near(same*bodies%radius(i))
+      seam(:) = 0.0_dp
+      seam(1) = seam_of(decomposition%shapes, candidate)
+      if (j > 0) seam(2) = seam_of(decomposition%shapes, antagonist)
+      call points%merge_near(same*bodies%radius(i), seam)
     end associate
     call points%keep_deepest(view%list%points_of(p))
   end subroutine find_points
@@ -368,6 +373,23 @@ contains
     end subroutine locate_vertex
 
   end subroutine touch_round_surface
+
+  !> How far apart the points of two pieces may be at a seam of a cluster [m]: both roundings. Disks, spheres and capsules have no
+  !> seams.
+  pure real(dp) function seam_of(shapes, seen) result(seam)
+    type(shape_library_t), intent(in) :: shapes
+    type(seen_body_t), intent(in) :: seen
+    integer :: k
+
+    seam = 0.0_dp
+    if (seen%shape == 0) return
+    associate (piece => shapes%shape(seen%shape)%piece)
+      if (size(piece) == 1) return
+      do k = 1, size(piece)
+        if (size(piece(k)%vertex, 2) > 2) seam = max(seam, two_roundings*seen%radius*piece(k)%rounding)
+      end do
+    end associate
+  end function seam_of
 
   pure integer function n_pieces(shapes, seen) result(n)
     type(shape_library_t), intent(in) :: shapes

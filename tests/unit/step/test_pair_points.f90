@@ -56,20 +56,20 @@ contains
 
     call points%add(manifold_of([0.0_dp, 1.0_dp], [0.1_dp, 0.2_dp], [1, 2]), 1, 1)
     call points%add(manifold_of([1.0_dp, 2.0_dp], [0.15_dp, 0.3_dp], [3, 4]), 2, 1)
-    call points%merge_near(1.0e-6_dp)
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
     call check_equal(points%n, 3, "two points are one")
     call check_close(points%gap(2), 0.15_dp, 0.0_dp, "the deeper one stays")
     call check_close(points%gap(3), 0.3_dp, 0.0_dp, "and the others")
     points%n = 0
     call points%add(manifold_of([1.0_dp, 1.0_dp], [0.1_dp, 0.2_dp], [1, 2]), 1, 1)
-    call points%merge_near(1.0e-6_dp)
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
     call check_equal(points%n, 2, "points of one pair of pieces")
     points%n = 0
     turned = manifold_of([1.0_dp], [0.1_dp], [1])
     call points%add(turned, 1, 1)
     turned%normal(:) = [1.0_dp, 0.0_dp, 0.0_dp]
     call points%add(turned, 2, 1)
-    call points%merge_near(1.0e-6_dp)
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
     call check_equal(points%n, 2, "points with other normals")
   end subroutine test_merge
 
