@@ -12,7 +12,7 @@ module gravier_config_report
   type :: given_t
     !> the entries that are set
     logical :: entries(8) = .false.
-    !> some by its index
+    !> an entry is set by its index
     logical :: by_index = .false.
     !> `key = value` as the file has it; several, separated by commas, when the entries were set one by one
     character(len=:), allocatable :: shown
@@ -89,7 +89,7 @@ contains
     is_given = any(report%given(find_key(group, key), report%instance)%entries)
   end function is_given
 
-  !> Whether a list is not given at all, entry by entry, or up to an entry at least, which would keep its default otherwise.
+  !> Whether a list sets an entry, which would keep its default otherwise. It need not if it is not given, or is given by indices.
   pure logical function reaches(report, group, key, entry)
     type(report_t), intent(in) :: report
     character(len=*), intent(in) :: group, key

@@ -73,7 +73,7 @@ contains
       bodies = max(simulation%n_grains, 1_i8)
       call draw_bodies(simulation, table)
       call open_one(self%bodies, simulation, directory//bodies_name, table, states*bodies, error)
-      ! it was written after the checkpoint, where the run ended in the same step
+      ! a run that ended in the step of its checkpoint has written this state
       if (self%bodies%has_last) self%last = simulation%step
       if (has_facets(simulation%decomposition%boundaries)) then
         call draw_facets(simulation, table)

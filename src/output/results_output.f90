@@ -66,7 +66,7 @@ contains
     if (simulation%restarted) then
       self%last = simulation%last_written
       call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error)
-      ! it was written after the checkpoint, where the run ended in the same step
+      ! a run that ended in the step of its checkpoint has written this state
       if (self%file%has_last) self%last = simulation%step
       return
     end if

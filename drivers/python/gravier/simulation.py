@@ -420,7 +420,7 @@ class Simulation:
             return np.full(n, missing, float) if values is None else np.ascontiguousarray(np.broadcast_to(_reals(values, what), n))
 
         try:
-            # the library takes a mass of 0 for one that was not given; NaN, which it refuses, stands for a 0 that was
+            # A mass of 0 means to the library that none is given. One that is given as 0 is passed as NaN, which the library refuses.
             given = None if mass is None else np.where(_reals(mass, "mass") == 0.0, np.nan, _reals(mass, "mass"))
             radius, mass, material = column(radius, "radius", 0.0), column(given, "mass", 0.0), column(material, "material", 1.0)
         except ValueError:

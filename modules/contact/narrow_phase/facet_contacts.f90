@@ -13,7 +13,7 @@ module gravier_facet_contacts
   use gravier_manifold, only: manifold_t
   implicit none
   private
-  public :: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
+  public :: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts, keep_corners
 
   !> Sine of the slope of a facet at and below which it does not hide a point: rounding for balls. Pieces with sides also keep
   !> points that they reach by a small turn.
@@ -165,7 +165,6 @@ contains
 
   !> Drop what a side that leans over a facet has at a joint of a hollow wall. Where the normal is that of the side, the facet
   !> touches it with one of its ends. If the next facet hides that end, a side that passes over the joint would be stopped there.
-  !> What stays is a corner of the piece over the facet, which stands on it once the side turns.
   pure subroutine drop_joint(candidates, k, near, tolerance, manifold)
     type(facet_candidates_t), intent(in) :: candidates
     !> place of the candidate in the order
@@ -175,8 +174,8 @@ contains
     real(dp), intent(in) :: tolerance
     !> of the candidate
     type(manifold_t), intent(inout) :: manifold
-    real(dp) :: foot(3, 2), nearer_end(3), other_end(3)
-    integer :: nearer, other
+    real(dp) :: foot(3, 2), end_of_facet(3)
+    integer :: nearer
 
     if (manifold%n < 2) return
     associate (item => candidates%item(candidates%order(k)))
@@ -185,22 +184,51 @@ contains
       call find_foot_of(manifold, 2, foot(:, 2))
       if (abs(manifold%gap(2) - manifold%gap(1)) <= slack_of_pieces*norm2(foot(:, 2) - foot(:, 1))) return
       nearer = merge(1, 2, manifold%gap(1) < manifold%gap(2))
-      other = 3 - nearer
-      nearer_end(:) = near%corner(:, 1, item%place)
-      other_end(:) = near%corner(:, 2, item%place)
-      if (norm2(foot(:, nearer) - other_end) < norm2(foot(:, nearer) - nearer_end)) then
-        nearer_end(:) = other_end
-        other_end(:) = near%corner(:, 1, item%place)
-      end if
+      end_of_facet(:) = near%corner(:, 1, item%place)
+      if (norm2(foot(:, nearer) - near%corner(:, 2, item%place)) < norm2(foot(:, nearer) - end_of_facet)) &
+        & end_of_facet(:) = near%corner(:, 2, item%place)
+      if (candidates%is_hidden(k, near, end_of_facet, tolerance, slack_of_pieces)) &
+        & call keep_corners(near%corner(:, :, item%place), tolerance, slack_of_pieces, manifold)
     end associate
-    if (.not. candidates%is_hidden(k, near, nearer_end, tolerance, slack_of_pieces)) return
-    manifold%n = 0
-    if (norm2(foot(:, other) - other_end) <= tolerance) return
-    manifold%n = 1
-    manifold%point(:, 1) = manifold%point(:, other)
-    manifold%gap(1) = manifold%gap(other)
-    manifold%key(1) = manifold%key(other)
   end subroutine drop_joint
+
+  !> Of a side that leans over a segment or a rectangle whose nearest edge is in a joint, keep the corners of the body that lie over
+  !> it: they stand on it once the side turns.
+  pure subroutine keep_corners(corners, tolerance, slack, manifold)
+    !> of the segment or rectangle, from where the manifold is seen (3, 2 or 4) [m]
+    real(dp), intent(in) :: corners(:, :)
+    !> distance from its edges within which points are on them [m]; slope below which points are as deep as the deepest
+    real(dp), intent(in) :: tolerance, slack
+    type(manifold_t), intent(inout) :: manifold
+    real(dp) :: foot(3), deepest(3), least, edge(3, 2), to_edge(3)
+    integer :: c, e, n, where_foot_is
+    logical :: kept
+
+    if (manifold%n == 0) return
+    c = minloc(manifold%gap(1:manifold%n), 1)
+    least = manifold%gap(c)
+    call find_foot_of(manifold, c, deepest)
+    n = 0
+    do c = 1, manifold%n
+      call find_foot_of(manifold, c, foot)
+      kept = manifold%gap(c) - least > slack*norm2(foot - deepest)
+      do e = 1, size(corners, 2)
+        to_edge(:) = corners(:, e) - foot
+        if (size(corners, 2) == 4) then
+          edge(:, 1) = to_edge
+          edge(:, 2) = corners(:, mod(e, 4) + 1) - foot
+          call find_foot(edge, to_edge, where_foot_is)
+        end if
+        kept = kept .and. norm2(to_edge) > tolerance
+      end do
+      if (.not. kept) cycle
+      n = n + 1
+      manifold%point(:, n) = manifold%point(:, c)
+      manifold%gap(n) = manifold%gap(c)
+      manifold%key(n) = manifold%key(c)
+    end do
+    manifold%n = n
+  end subroutine keep_corners
 
   !> The contacts of a piece in space that is no ball, in its axes.
   pure subroutine find_polyhedron_contacts(piece, radius, near, alert, most, found)

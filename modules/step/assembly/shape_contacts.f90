@@ -8,14 +8,15 @@ module gravier_shape_contacts
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_plane_manifold
   use gravier_polyhedron_pair, only: find_halfspace_manifold
   use gravier_facet, only: near_facets_t, find_facet_normal
-  use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
+  use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts, &
+    & keep_corners
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
   use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
   use gravier_surface_velocity, only: add_image_velocity
   use gravier_piece_meeting, only: room_t, nearest_t, meet_pieces, find_nearest_points
   use gravier_clear_path, only: clear_path
-  use gravier_wall_joints, only: is_in_joint, keep_corners
+  use gravier_wall_joints, only: is_in_joint
   use gravier_pair_points, only: pair_points_t
   implicit none
   private

@@ -4,7 +4,8 @@ program test_wall_joints
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t
   use gravier_surface_registry, only: make_surface
-  use gravier_wall_joints, only: is_in_joint, keep_corners
+  use gravier_facet_contacts, only: keep_corners
+  use gravier_wall_joints, only: is_in_joint
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: tolerance = 1.0e-7_dp, slack = 1.0e-3_dp
