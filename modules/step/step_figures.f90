@@ -45,10 +45,29 @@ module gravier_step_figures
     !> contact with the largest
     character(len=:), allocatable :: cause
   contains
+    procedure :: uncertain_velocity => step_figures_uncertain_velocity
     procedure :: check_numbers => step_figures_check_numbers
   end type step_figures_t
 
+  !> times the estimated velocity error, a mean by mass, by which a contact of little mass is taken to be wrong at most
+  real(dp), parameter :: trusted = 3.0_dp
+  !> rounding of velocities, over what the largest impulses of a step give to a grain
+  real(dp), parameter :: rounding = 1.0e-12_dp
+
 contains
+
+  !> The velocity up to which the solve may be wrong about what a contact does: what it errs by as a whole, and the most by which a
+  !> contact violates its law. All that is compared with an accuracy is what is not known of these [m/s].
+  pure real(dp) function step_figures_uncertain_velocity(self, of_bonds) result(uncertain)
+    class(step_figures_t), intent(in) :: self
+    !> what the strength of bonds gives to the mean grain in a step [m/s]
+    real(dp), intent(in) :: of_bonds
+
+    associate (solve => self%solve)
+      uncertain = min(max(trusted*solve%velocity_error, solve%violation), solve%velocity_scale)
+    end associate
+    uncertain = max(uncertain, rounding*of_bonds)
+  end function step_figures_uncertain_velocity
 
   !> Fail (status_failure) where a figure of the step is NaN or infinite. Errors are the same on all ranks. Collective.
   subroutine step_figures_check_numbers(self, decomposition, diagnostics, step, error)

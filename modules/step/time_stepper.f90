@@ -353,7 +353,7 @@ contains
       & call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
     if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
-      & self%halo)
+      & figures%uncertain_velocity(self%velocity_scale%bonds), self%halo)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)

@@ -252,6 +252,50 @@ class ShapeLaws(RunTestCase):
                     self.assertEqual(differences({key: value for key, value in run.results().items() if "run@" not in key},
                                                  {key: value for key, value in again.results().items() if "run@" not in key}), [], title)
 
+    def test_strength_of_a_joint(self):
+        """A cube hangs on a wall by two bonds. Half of its weight is the least strength that holds its moment; 1.2 times as much, with a friction of
+        0.6, is what holds it against sliding. It stands at 1.01 times the greater of both and falls at 0.98 times, whatever the method and the
+        accuracy: plain sweeps and those of subdomains load one bond up to its limit and leave the other a reserve."""
+        weight = 2500.0 * 0.04 * G
+        wall = [{"shape": "plane", "point": [0.0, 0.0], "normal": [1.0, 0.0], "material": "m"}]
+        solvers = [{}, {"accuracy": 1e-4}, {"acceleration": "none"}, {"method": "newton"}, {"method": "schwarz"}, {"method": "schwarz_ec"}, {"method": "nscdd"}]
+        for friction in (1.1, 0.6):
+            for number, solver in enumerate(solvers):
+                for share in (1.01, 0.98):
+                    with self.subTest(friction=friction, solver=solver, share=share):
+                        directory = prepare(self.here(f"joint {friction} {number} {share}"), 2, [body("block", [0.1, 0.0], 0.0)], BLOCK[2])
+                        bond = {"materials": "m", "kind": "bonded", "friction": 0.3, "bond_friction": friction, "bond_distance": 1e-4,
+                                "bond_strength": share * weight * max(0.5, 0.5 / friction)}
+                        run = run_case(shaped_case(2, wall, {"solver": solver, "material": [{"name": "m", "density": 2500.0}], "law": [bond],
+                                                             "scene": {"gravity": [0.0, -G]}, "time": {"steps": 60, "step": 1e-3}, "output": {"every": 60}}), 1, directory)
+                        self.assert_status(run, 0)
+                        fall = -self.track(run)[-1, 1]
+                        if share > 1.0:
+                            self.assertLess(fall, 1e-5)
+                        else:
+                            self.assertGreater(fall, 2e-5)
+
+    def test_strength_of_a_joint_that_turns(self):
+        """The same cube at the height of the pivot about which the wall turns, but 1 m away: it pulls with its weight at the spin sqrt(g / 1 m)."""
+        rate, steps = np.sqrt(G), 200
+        wall = {"shape": "segment", "point": [0.0, -0.1], "end": [0.0, 0.1], "rotation": float(rate), "pivot": [0.1, 1.0], "material": "m"}
+        for acceleration in ("momentum", "none"):
+            for share in (1.01, 0.98):
+                with self.subTest(acceleration=acceleration, share=share):
+                    directory = prepare(self.here(f"turning joint {acceleration} {share}"), 2, [body("block", [0.1, 0.0], 0.0, [float(rate), 0.0], float(rate))], BLOCK[2])
+                    bond = {"materials": "m", "kind": "bonded", "friction": 0.3, "bond_friction": 1.1, "bond_distance": 1e-4,
+                            "bond_strength": share * 0.5 * 2500.0 * 0.04 * G}
+                    run = run_case(shaped_case(2, [wall], {"solver": {"accuracy": 1e-4, "acceleration": acceleration}, "material": [{"name": "m", "density": 2500.0}],
+                                                           "law": [bond], "scene": {"gravity": [0.0, 0.0]}, "time": {"steps": steps, "step": 1e-3}, "output": {"every": steps}}),
+                                   1, directory)
+                    self.assert_status(run, 0)
+                    way = rate * 1e-3 * steps
+                    apart = np.linalg.norm(self.track(run)[-1] - np.array([0.1 + np.sin(way), 1.0 - np.cos(way)]))
+                    if share > 1.0:
+                        self.assertLess(apart, 1e-5)
+                    else:
+                        self.assertGreater(apart, 1e-3)
+
     def test_edges(self):
         """Blocks on both sides of a segment or a rectangle, across its end, and under its corner, rest or pass; one that lies beyond it falls."""
         for dimension in (2, 3):

@@ -1,16 +1,17 @@
 !> Bonds of Mohr's type: pairs that are near at the start of a run are bonded. An intact bond keeps the bodies from parting and
 !> from closing, also where they turn as one (gravier_bond_turning), with tensions up to its strength F and shear
-!> |r_t| <= mu_b (r_n + h F). One that opens
-!> or slides in a step is broken for good, and the law is Coulomb's from the next step on.
+!> |r_t| <= mu_b (r_n + h F). One that opens or slides in a step is broken for good, and the law is Coulomb's from the next step on.
+!> A bond at its limit whose bodies do not move against each other is intact: others bear what it does not. Which of several bonds
+!> are at their limit is not unique between rigid bodies, whether these move is.
 module gravier_bonded_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys, unused
   implicit none
   private
   public :: bonded_law_t
 
-  !> state of a pair with an intact bond; a bond that opens or slides leaves 0 (contact_law_t%conclude)
+  !> state of a pair with an intact bond; that of all others is 0
   integer, parameter :: intact = 1
 
   type, extends(contact_law_t) :: bonded_law_t
@@ -25,6 +26,7 @@ module gravier_bonded_law
     procedure, nopass :: keys => bonded_keys
     procedure :: set => bonded_set
     procedure :: evaluate => bonded_evaluate
+    procedure :: conclude => bonded_conclude
   end type bonded_law_t
 
   type(declared_key_t), parameter :: law_keys(*) = &
@@ -74,5 +76,17 @@ contains
     pair%terms%free_gap = 0.0_dp
     pair%terms%joins = .true.
   end subroutine bonded_evaluate
+
+  !> A bond breaks that is at its limit and gives way, faster than the solve may be wrong.
+  pure subroutine bonded_conclude(self, pair)
+    class(bonded_law_t), intent(in) :: self
+    type(contact_pair_t), intent(inout) :: pair
+    logical :: at_limit
+
+    if (pair%state /= intact) return
+    ! one without an impulse, under its full tension, is at its limit by this, too
+    at_limit = pair%tangential >= (1.0_dp - unused)*self%bond_friction*pair%normal
+    if (at_limit .and. pair%motion > pair%uncertain) pair%state = 0
+  end subroutine bonded_conclude
 
 end module gravier_bonded_law

@@ -52,6 +52,9 @@ module gravier_contact_law
     type(spring_t) :: spring
     !> once the step is solved: r~_n and |r_t| [N s]
     real(dp) :: normal = 0.0_dp, tangential = 0.0_dp
+    !> once the step is solved, of a law that breaks: how fast the bodies part or slide on each other, beside what their joint
+    !> allows, and the velocity up to which the solve may be wrong about that [m/s]
+    real(dp) :: motion = 0.0_dp, uncertain = 0.0_dp
   end type contact_pair_t
 
   type, abstract :: contact_law_t
@@ -115,12 +118,12 @@ module gravier_contact_law
 
 contains
 
-  !> The state of a pair whose step is solved: a pair that parts or slides forgets, unless its law says otherwise.
+  !> The state of a pair whose step is solved: it stays where the law remembers, unless the law says otherwise.
   pure subroutine contact_law_conclude(self, pair)
     class(contact_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
 
-    if (slides(pair) .or. .not. self%remembers) pair%state = 0
+    if (.not. self%remembers) pair%state = 0
   end subroutine contact_law_conclude
 
   !> The keys of a law with friction: its own, then those of the resistance to rolling and pivoting, which set_resistance takes.
@@ -141,13 +144,5 @@ contains
     self%largest%rolling_friction = rolling
     self%largest%pivoting_friction = pivoting
   end subroutine contact_law_set_resistance
-
-  !> Whether a contact carries nothing or uses all its friction.
-  pure logical function slides(pair)
-    type(contact_pair_t), intent(in) :: pair
-
-    slides = .not. pair%normal > 0.0_dp
-    if (.not. slides) slides = pair%tangential >= (1.0_dp - unused)*pair%terms%friction*pair%normal
-  end function slides
 
 end module gravier_contact_law

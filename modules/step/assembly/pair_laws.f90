@@ -8,6 +8,7 @@ module gravier_pair_laws
   use gravier_material_filter, only: material_of
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_cell_response, only: subtract_images
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity, add_image_velocity
   implicit none
@@ -134,17 +135,22 @@ contains
     pair%reduced_mass = 1.0_dp/inverse
   end subroutine find_reduced
 
-  !> The states of the pairs of a solved problem, whose impulses are those of the solve.
-  subroutine conclude_pairs(problem, boundaries, laws, halo)
+  !> The states of the pairs of a solved problem, whose impulses and velocities are those of the solve.
+  subroutine conclude_pairs(problem, boundaries, laws, uncertain, halo)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
+    !> velocity up to which the solve may be wrong about what a contact does [m/s]
+    real(dp), intent(in) :: uncertain
     type(halo_t), intent(inout) :: halo
+    real(dp), allocatable :: v(:, :, :)
     type(contact_pair_t) :: pair
     integer :: s, c, q, g, l, p
 
+    pair%uncertain = uncertain
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s))
+      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+        if (laws%breaks) call find_slips(problem, s, v)
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)
@@ -153,14 +159,34 @@ contains
           pair%state = view%list%state(view%list%memory%law_row, p)
           pair%gap = sub%gap(c)
           pair%normal = sub%impulse(q, 1, g)
-          pair%tangential = norm2(sub%impulse(q, 2:problem%kernels%nf, g))
-          pair%terms%friction = 0.0_dp
-          if (problem%kernels%nf > 1) pair%terms%friction = sub%hot(q, problem%kernels%row%friction, g)
+          pair%tangential = norm2(sub%impulse(q, 2:nf, g))
+          if (laws%breaks) pair%motion = hypot(max(v(q, 1, g), 0.0_dp), norm2(v(q, 2:nf, g)))
           call laws%of(l)%law%conclude(pair)
           view%list%state(view%list%memory%law_row, p) = pair%state
         end do
       end associate
     end do
   end subroutine conclude_pairs
+
+  !> Velocities of the contacts of a solved subdomain beside those that their laws ask for where the bodies stay joined.
+  subroutine find_slips(problem, s, v)
+    type(contact_problem_t), intent(in) :: problem
+    !> place of the subdomain among those of this rank
+    integer, intent(in) :: s
+    !> (lanes, nc, blocks) [m/s]
+    real(dp), allocatable, intent(inout) :: v(:, :, :)
+    integer :: last
+
+    if (allocated(v)) deallocate (v)
+    associate (sub => problem%sub(s), row => problem%kernels%row)
+      allocate (v, mold=sub%impulse)
+      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+      if (problem%cell%moves) call subtract_images(problem, s, v)
+      v(:, 1, :) = v(:, 1, :) + sub%hot(:, row%shift, :)
+      if (row%shift_t == 0) return
+      last = problem%kernels%nf - 2
+      v(:, 2:2 + last, :) = v(:, 2:2 + last, :) + sub%hot(:, row%shift_t:row%shift_t + last, :)
+    end associate
+  end subroutine find_slips
 
 end module gravier_pair_laws

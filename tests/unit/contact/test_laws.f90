@@ -296,19 +296,30 @@ contains
     call check_terms(pair, 0.3_dp, 0.0_dp, 0.011_dp, "bonded: no bond beyond the distance")
     ! r~_n = r_n + h F: a bond under a tension less than h F has r~_n > 0
     pair%state = 1
-    pair%terms%friction = 0.8_dp
+    pair%uncertain = 0.02_dp
+    pair%motion = 0.03_dp
     pair%normal = 2.0_dp
     pair%tangential = 1.6_dp*(1.0_dp - 2*unused)
     call law%conclude(pair)
-    call check_equal(pair%state, 1, "bonded: a bond below its shear strength stays")
+    call check_equal(pair%state, 1, "bonded: a bond below its shear strength stays, whatever the solve leaves of velocities")
     pair%tangential = 1.6_dp
+    pair%motion = 0.02_dp
     call law%conclude(pair)
-    call check_equal(pair%state, 0, "bonded: a bond at its shear strength breaks")
+    call check_equal(pair%state, 1, "bonded: a bond at its shear strength that does not slide stays")
+    pair%motion = 0.03_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "bonded: a bond at its shear strength that slides breaks")
     pair%state = 1
     pair%normal = 0.0_dp
     pair%tangential = 0.0_dp
+    pair%motion = 0.02_dp
     call law%conclude(pair)
-    call check_equal(pair%state, 0, "bonded: a bond at its strength breaks")
+    call check_equal(pair%state, 1, "bonded: a bond at its strength that does not open stays")
+    pair%motion = 0.03_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "bonded: a bond at its strength that opens breaks")
+    call law%conclude(pair)
+    call check_equal(pair%state, 0, "bonded: a broken bond stays broken")
   end subroutine check_bonded
 
   !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
