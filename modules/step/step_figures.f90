@@ -49,8 +49,8 @@ module gravier_step_figures
     procedure :: check_numbers => step_figures_check_numbers
   end type step_figures_t
 
-  !> times the estimated velocity error, a mean by mass, by which a contact of little mass is taken to be wrong at most
-  real(dp), parameter :: trusted = 3.0_dp
+  !> times the estimated velocity error, a mean by mass, by which what a contact does is taken to be wrong at most
+  real(dp), parameter :: trusted = 10.0_dp
   !> rounding of velocities, over what the largest impulses of a step give to a grain
   real(dp), parameter :: rounding = 1.0e-12_dp
 

@@ -145,9 +145,10 @@ contains
     integer, intent(in) :: step
     character(len=:), allocatable :: text
 
-    text = "the radius"
-    if (simulation%effects%shapes) text = "half of the thickness"
-    text = "in step "//to_text(step)//" the way of "//counted(fast, "grain")//", or of a boundary towards it, is longer than "//text
+    text = ", or of a boundary towards it, is longer than the radius"
+    if (simulation%effects%shapes) text = &
+      & ", of an end that turns, or of a boundary towards it, is longer than half of the thickness"
+    text = "in step "//to_text(step)//" the way of "//counted(fast, "grain")//text
   end function fast_warning
 
   !> That the step does not resolve the collisions of the stiffest compliant contacts.

@@ -313,7 +313,7 @@ class Shapes(RunTestCase):
         solid = {"scene": {"dimension": 3, "friction": 0.0, "gravity": [0, 0, 0]}}
         spring = {"scene": {"friction": 0.0, "gravity": [0, 0]}, "material": [{"name": "m"}],
                   "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e5}]}
-        fast = "in step 1 the way of 1 grain, or of a boundary towards it, is longer than half of the thickness"
+        fast = "in step 1 the way of 1 grain, of an end that turns, or of a boundary towards it, is longer than half of the thickness"
         deep = "overlap by a quarter of a thickness and more"
         for name, shape, bodies, more, steps, words in (
                 ("slab", "box 1 1 0.01", head + "-15,\n", merged(solid, {"scene": {"restitution": 0.5}}), (1e-3, 20), (fast, deep)),
@@ -330,6 +330,16 @@ class Shapes(RunTestCase):
                     self.assertEqual(word in run.stdout, word in words, word)
                 check = gravier("--check", "case.nml", directory=directory)
                 self.assertEqual(fast in check.stdout, fast in words)
+
+    def test_ends_that_turn_fast(self):
+        """A needle that turns by half a radian in a step passes through another one: it is counted and warned of; by 0.004 rad it is not."""
+        needles = "id,x,y,shape,angle,omega,radius\n1,0,0,rod,-1.5,50,\n2,1.5,0,rod,0,0,\n"
+        for step, counts in ((1e-2, True), (8e-5, False)):
+            directory = self.prepare(f"needles {step}", "shape rod\nrounding 0.002\npolygon -1 -0.01 1 -0.01 1 0.01 -1 0.01\n", needles)
+            run = run_case(merged(CASE, {"scene": {"gravity": [0, 0]}, "time": {"step": step, "steps": 5}}), 1, directory)
+            self.assert_status(run, 0)
+            self.assertEqual(run.history()["fast"].tolist(), [float(counts)] * 5)
+            self.assertEqual("of an end that turns, or of a boundary towards it, is longer than half of the thickness" in run.stdout, counts)
 
     def test_thin_start(self):
         """What overlaps by more than half of the half thickness of a slab is refused."""

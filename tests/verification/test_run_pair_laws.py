@@ -192,6 +192,24 @@ class Adhesion(SmallScene):
             self.verify(f"{dimension}D grains that cling on the ground", "speed [m/s]", record.velocity[-1, 2:], 0.0, 1e-6)
         self.both(check)
 
+    def test_pull_beside_sleepers(self):
+        """A grain whose weight is twice what a ceiling pulls it up with falls off while another falls asleep: files and balances have the
+        whole pull in every step, also in those in which the contacts that are solved are not all there are."""
+        grains = [Grain((-0.5, RADIUS), mass=MASS), Grain((0.5, 0.501 - RADIUS), velocity=(0.05, 0.1), mass=MASS, material=2),
+                  Grain((-0.8, 1.01 * RADIUS), mass=MASS)]
+        boundaries = [{**plane((0, 0), (0, 1)), "material": "dry"}, {**plane((0, 0.5), (0, -1)), "material": "wet"}]
+        for kind, keys in (("adhesive", {"adhesion": 0.5 * MASS * G, "adhesion_range": 0.025}), ("elastic", {"pull_off_force": 0.5 * MASS * G, "normal_stiffness": 1e5})):
+            with self.subTest(kind):
+                record = self.play(f"asleep {kind}", grains, boundaries, (0.0, -G), 40, material=named("dry", "wet"), law=[law("wet", kind, friction=0.3, **keys)],
+                                   scene={"friction": 0.3, "alert_distance": 0.03}, solver={"criterion": "velocity_error", "accuracy": 1e-6, "tolerance": 1e-4, "warm_start": True, "sleeping": True, "sleep_after": 5},
+                                   output={"every": 1, "boundary_forces": True, "energy": True})
+                history = record.run.history()
+                self.assertIn(1.0, np.abs(np.diff(history["sleeping"])))
+                gain = np.diff(record.velocity[:, 1, 1]) / self.step
+                names = [name for name in history if name.startswith("force_y:")]
+                self.verify(f"{kind} pull beside grains that fall asleep", "force on the ceiling [N]", history[names[1]][1:], -MASS * (gain[1:] + G), 1e-6)
+                self.verify(f"{kind} pull beside grains that fall asleep", "error of the energy balance [J]", history["energy_error"], 0.0, 1e-9)
+
     def test_friction_of_adhesive_grains(self):
         """Without weight a grain on a plate that attracts it slides under a force above mu F: one of two masses does."""
         masses, pull, bound = np.array([0.99, 1.01]) * MASS, 0.3 * self.force / MASS, 0.3 * self.force
@@ -274,6 +292,34 @@ class Bonds(SmallScene):
         fall = -G * record.time + 4.9 / 5 * G * self.step * (record.time > 0)
         self.verify(case, "speed of the disk that stays [m/s]", record.velocity[:, 6, 1], 0.0, 1e-9)
         self.verify(case, "speed of the five that fall [m/s]", record.velocity[:, 7:, 1], fall[:, None], 1e-8)
+
+    def test_strength_of_a_block(self):
+        """Layers of grains between two that are glued bear the sum of the bonds between two layers, whatever the method, at default settings. A
+        load that grows by 1/128 of it in a step finds that within nine steps, in which the bonds at their limit give way."""
+        n, strength = 4, 2.0
+        bond = law("a", "bonded", bond_strength=strength, bond_friction=1.0, bond_distance=1e-4, friction=0.5)
+
+        def check(dimension):
+            up, whole = unit(dimension, -1), n**(dimension - 1) * strength
+            places = [np.array(place) for place in np.ndindex(*[n] * dimension)]
+            grains = [Grain(2 * RADIUS * place, mass=1e-3, group={0: 1, n - 1: 2}.get(place[-1], 0)) for place in places]
+            table = "time,%s\n0,%r\n1,%r\n" % ("fz" if dimension == 3 else "fy", 0.8 * whole, 4.8 * whole)
+            for method in ("nlgs", "nscdd", "newton"):
+                record = self.play(f"block {dimension} {method}", grains,
+                                   [{"name": "low", "shape": "grains", "group": 1},
+                                    {"name": "high", "shape": "grains", "group": 2, "free": [bool(x) for x in up], "mass": 0.016, "table": "load.csv"}], None, 40,
+                                   files={"load.csv": table}, material=named("a"), law=[bond], solver={"method": method, "criterion": "velocity_error", "tolerance": 0.01,
+                                   "check_every": 10, "warm_start": True, "max_iterations": 10000}, output={"every": 40, "boundary_forces": True},
+                                   decomposition={"subdomains": 1 if method == "nlgs" else 4})
+                history = record.run.history()
+                force = np.abs(history[f"force_{'xyz'[dimension - 1]}:low"])
+                case = f"{dimension}D block of bonded grains, {method}"
+                self.verify(case, "strength over the sum of the bonds", force.max() / whole, 1.0, 1e-3)
+                # the mean load of step k is 0.8 + (k + 1/2)/128 of the strength
+                torn = np.flatnonzero(force < 0.5 * whole)[0]
+                self.assertGreater(torn, 25)
+                self.assertLess(torn, 35)
+        self.both(check)
 
     def test_broken_for_good(self):
         """A disk is torn from a ceiling and thrown back at it: the bond does not form again."""

@@ -4,7 +4,7 @@
 module gravier_capillary_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys, rounded_gap
   implicit none
   private
   public :: capillary_law_t
@@ -66,7 +66,7 @@ contains
     type(contact_pair_t), intent(inout) :: pair
 
     pair%terms%friction = self%friction
-    if (pair%gap <= 0.0_dp) pair%state = bridged
+    if (pair%gap <= rounded_gap*pair%radius) pair%state = bridged
     if (pair%gap > self%debonding_distance) pair%state = 0
     if (pair%state == bridged) &
       & pair%terms%attraction = self%capillarity*pair%radius*exp(-max(pair%gap, 0.0_dp)/self%decay_length)

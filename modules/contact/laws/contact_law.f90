@@ -9,10 +9,12 @@ module gravier_contact_law
   use gravier_contact_spring, only: spring_t
   implicit none
   private
-  public :: contact_law_t, contact_pair_t, contact_terms_t, add_resistance_keys, unused
+  public :: contact_law_t, contact_pair_t, contact_terms_t, add_resistance_keys, unused, rounded_gap
 
   !> a contact slides whose friction is used but for this part
   real(dp), parameter :: unused = 1.0e-6_dp
+  !> gap over the radius that is rounding: the bodies touch
+  real(dp), parameter :: rounded_gap = 1.0e-9_dp
 
   !> keys of all laws with friction
   type(declared_key_t), parameter :: resistance_keys(2) = &

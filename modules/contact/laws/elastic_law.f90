@@ -7,7 +7,7 @@ module gravier_elastic_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
   use gravier_contact_spring, only: spring_t, damping_ratio
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, add_resistance_keys, rounded_gap
   implicit none
   private
   public :: elastic_law_t, spring_law_t, spring_keys
@@ -81,7 +81,7 @@ contains
     type(contact_pair_t), intent(inout) :: pair
 
     pair%terms%friction = self%friction
-    if (pair%gap <= 0.0_dp) pair%terms%attraction = self%pull_off
+    if (pair%gap <= rounded_gap*pair%radius) pair%terms%attraction = self%pull_off
     pair%spring = self%spring
   end subroutine spring_law_begin_pair
 

@@ -137,7 +137,8 @@ contains
   end function name_of
 
   !> Keep those points that the convex hull of all has as corners (A. M. Andrew, Inf. Process. Lett. 9 (1979) 216): forces there can
-  !> be any that forces at all points can.
+  !> be any that forces at all points can. The chain goes along the longest way between two points: along a side that is across it,
+  !> rounding would decide which point comes first.
   pure subroutine keep_outline(near, n, point)
     !> points this near to the line of two others lie on it [m]
     real(dp), intent(in) :: near
@@ -145,8 +146,14 @@ contains
     type(patch_point_t), intent(inout) :: point(:)
     integer :: order(n), chain(2*n), k, l, m, first, kept
     logical :: stays(n)
+    real(dp) :: axis(2), along(n), across(n)
 
     if (n < 3) return
+    call find_longest(n, point, axis)
+    do k = 1, n
+      along(k) = axis(1)*point(k)%place(1) + axis(2)*point(k)%place(2)
+      across(k) = axis(1)*point(k)%place(2) - axis(2)*point(k)%place(1)
+    end do
     do k = 1, n
       kept = k
       l = k
@@ -183,8 +190,8 @@ contains
     pure logical function is_before(a, b)
       integer, intent(in) :: a, b
 
-      is_before = point(a)%place(1) < point(b)%place(1)
-      if (.not. is_before .and. .not. point(b)%place(1) < point(a)%place(1)) is_before = point(a)%place(2) < point(b)%place(2)
+      is_before = along(a) < along(b)
+      if (.not. is_before .and. .not. along(b) < along(a)) is_before = across(a) < across(b)
     end function is_before
 
     !> Go on with the chain to a point, past those that do not stick out to its right.
@@ -206,5 +213,32 @@ contains
     end subroutine extend
 
   end subroutine keep_outline
+
+  !> The way between two points of which each is the farthest from the other.
+  pure subroutine find_longest(n, point, way)
+    !> 1 or more
+    integer, intent(in) :: n
+    type(patch_point_t), intent(in) :: point(:)
+    real(dp), intent(out) :: way(2)
+    real(dp) :: length, longest
+    integer :: here, there, k
+
+    way(:) = 0.0_dp
+    longest = -1.0_dp
+    there = 1
+    do
+      here = there
+      length = longest
+      do k = 1, n
+        associate (square => sum((point(k)%place(1:2) - point(here)%place(1:2))**2))
+          if (.not. square > longest) cycle
+          longest = square
+          way(:) = point(k)%place(1:2) - point(here)%place(1:2)
+          there = k
+        end associate
+      end do
+      if (.not. longest > length) return
+    end do
+  end subroutine find_longest
 
 end module gravier_flat_patch

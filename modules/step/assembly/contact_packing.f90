@@ -2,7 +2,7 @@
 module gravier_contact_packing
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
-  use gravier_contact_law, only: contact_terms_t
+  use gravier_contact_law, only: contact_terms_t, rounded_gap
   use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius, contact_tangents
   use gravier_sweep_order, only: group_contacts
@@ -32,9 +32,6 @@ module gravier_contact_packing
     !> what its law makes of the step
     type(contact_terms_t) :: terms
   end type packed_t
-
-  !> gap over the radius of the candidate that is rounding
-  real(dp), parameter :: rounded_gap = 1.0e-9_dp
 
 contains
 

@@ -9,6 +9,8 @@ module gravier_pair_points
 
   !> directions of normals that are the same
   real(dp), parameter :: same = 1.0e-6_dp
+  !> depths that are equal, over the distance of points that are one
+  real(dp), parameter :: equal = 1.0e-3_dp
 
   !> Points in ascending order of their keys.
   type :: pair_points_t
@@ -75,7 +77,9 @@ contains
   !> Of points that are one, where pieces of a cluster meet, keep the deepest, of several the first. Where bodies overlap, the point
   !> of a corner lies half of the overlap away from it, in a direction that differs between pieces by their tilt: points that are
   !> nearer to each other than the overlap are one, too. At a seam of two pieces with sides their points are apart by both roundings
-  !> once the body leans: they are one at any lean, so that neither forces at a seam nor their number jump with it.
+  !> once the body leans: they are one at any lean, so that neither forces at a seam nor their number jump with it. Two points of
+  !> which both pieces have one are none at a seam. What is kept depends on rounding nowhere but where two points at a seam are
+  !> equally deep.
   pure subroutine pair_points_merge_near(points, near, seam)
     class(pair_points_t), intent(inout) :: points
     !> points of two pairs of pieces nearer to each other than this, with the same normal, are one [m]
@@ -83,30 +87,92 @@ contains
     !> the same for two pieces of the candidate, and of the antagonist, that touch one piece; 0 of a body of one piece [m]
     real(dp), intent(in) :: seam(2)
     logical :: dropped(points%n)
-    real(dp) :: apart
-    integer :: k, l
+    integer :: kept(points%n), k, l
 
     if (points%n < 2) return
     if (points%key(2, 1) == points%key(2, points%n)) return
-    dropped(:) = .false.
+    do k = 1, points%n
+      kept(k) = k
+    end do
     do k = 1, points%n
       do l = k + 1, points%n
-        if (points%key(2, k) == points%key(2, l)) cycle
-        if (dropped(k) .or. dropped(l)) cycle
-        apart = max(near, -points%gap(k), -points%gap(l))
-        if (points%key(2, k)/feature_base == points%key(2, l)/feature_base) then
-          apart = max(apart, seam(2))
-        else if (mod(points%key(2, k), feature_base) == mod(points%key(2, l), feature_base)) then
-          apart = max(apart, seam(1))
+        if (kept(k) /= k .or. kept(l) /= l .or. points%key(2, k) == points%key(2, l)) cycle
+        if (.not. are_within(points, k, l, max(near, -points%gap(k), -points%gap(l)))) cycle
+        if (is_before(points, near, k, l)) then
+          where (kept == l) kept = k
+        else
+          where (kept == k) kept = l
         end if
-        if (maxval(abs(points%point(:, k) - points%point(:, l))) > apart) cycle
-        if (maxval(abs(points%normal(:, k) - points%normal(:, l))) > same) cycle
-        dropped(l) = points%gap(l) >= points%gap(k)
-        dropped(k) = .not. dropped(l)
       end do
+    end do
+    dropped(:) = .false.
+    if (maxval(seam) > near) then
+      do k = 1, points%n
+        do l = k + 1, points%n
+          if (kept(k) /= k .or. kept(l) /= l) cycle
+          if (.not. are_within(points, k, l, maxval(seam))) cycle
+          if (.not. are_within(points, k, l, seam_between(points, kept, seam, k, l))) cycle
+          dropped(merge(l, k, is_before(points, near, k, l))) = .true.
+        end do
+      end do
+    end if
+    do k = 1, points%n
+      dropped(k) = dropped(k) .or. kept(k) /= k
     end do
     call drop(dropped, points)
   end subroutine pair_points_merge_near
+
+  !> Whether two points with the same normal are so near to each other.
+  pure logical function are_within(points, k, l, apart)
+    class(pair_points_t), intent(in) :: points
+    integer, intent(in) :: k, l
+    real(dp), intent(in) :: apart
+
+    are_within = sum((points%point(:, k) - points%point(:, l))**2) <= apart**2
+    if (are_within) are_within = maxval(abs(points%normal(:, k) - points%normal(:, l))) <= same
+  end function are_within
+
+  !> Whether point `k` is deeper than `l`, or as deep and before it. Depths are rounded, so that this is an order.
+  pure logical function is_before(points, near, k, l)
+    class(pair_points_t), intent(in) :: points
+    real(dp), intent(in) :: near
+    integer, intent(in) :: k, l
+    real(dp) :: one, other
+
+    one = anint(points%gap(k)/(equal*near))
+    other = anint(points%gap(l)/(equal*near))
+    is_before = one < other .or. (k < l .and. one <= other)
+  end function is_before
+
+  !> How far apart points `k` and `l` may be to be one at a seam: 0 if a pair of pieces has both, be it by points that are one with
+  !> them [m].
+  pure real(dp) function seam_between(points, kept, seam, k, l) result(apart)
+    class(pair_points_t), intent(in) :: points
+    !> the point that each is one with
+    integer, intent(in) :: kept(:)
+    real(dp), intent(in) :: seam(2)
+    integer, intent(in) :: k, l
+    integer :: m, n
+
+    apart = 0.0_dp
+    do m = 1, points%n
+      if (kept(m) /= k) cycle
+      do n = 1, points%n
+        if (kept(n) /= l) cycle
+        associate (one => points%key(2, m), other => points%key(2, n))
+          if (one == other) then
+            apart = 0.0_dp
+            return
+          end if
+          if (one/feature_base == other/feature_base) then
+            apart = max(apart, seam(2))
+          else if (mod(one, feature_base) == mod(other, feature_base)) then
+            apart = max(apart, seam(1))
+          end if
+        end associate
+      end do
+    end do
+  end function seam_between
 
   !> Keep at most so many points, those with the smallest gaps.
   pure subroutine pair_points_keep_deepest(points, most)

@@ -24,7 +24,7 @@ module gravier_shape_contacts
 
   !> points of one pair that are nearer to each other than this, over the radius of the candidate, may be one
   real(dp), parameter :: same = 1.0e-6_dp
-  !> largest distance of points at a seam along one axis, over the rounding of a piece
+  !> largest distance of points at a seam, over the rounding of a piece
   real(dp), parameter :: two_roundings = 2.01_dp
   !> distance, over the rounding of a piece, within which points of two boundaries are one; sine of the slope of a boundary at and
   !> below which it is level

@@ -17,8 +17,8 @@ module gravier_fast_grains
 contains
 
   !> Count the grains that move by more than half of their thickness in a step, a ball by more than its radius, beside a cell that
-  !> moves: they may pass through others unseen. Grains that come so much nearer to a boundary which itself goes half as far are
-  !> among them: it may pass through them. Collective.
+  !> moves, and bodies whose ends go so far beyond their middle by turning: they may pass through others unseen. Grains that come so
+  !> much nearer to a boundary which itself goes half as far are among them: it may pass through them. Collective.
   integer(i8) function count_fast(decomposition, physics) result(fast)
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -45,7 +45,7 @@ contains
             v(:) = v - carried
           end if
           half = decomposition%figures%half_thickness_of(owned, k)
-          is_fast = physics%h**2*sum(v**2) > half**2
+          is_fast = physics%h**2*max(sum(v**2), (owned%radius(k) - half)**2*sum(owned%velocity(nd + 1:, k)**2)) > half**2
           do b = 1, size(quick)
             if (is_fast .or. owned%glued(k) > 0) exit
             is_fast = may_be_passed(owned, k, half, decomposition%boundaries(quick(b)), physics%h, near)

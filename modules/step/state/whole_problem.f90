@@ -42,6 +42,10 @@ contains
       end associate
     end do
     call build_problem(decomposition, halo, solved%kernels, physics, whole, ignored)
+    ! a pair that keeps nothing was solved and carries nothing: the whole of its attraction pulls
+    do s = 1, size(whole%sub)
+      whole%sub(s)%impulse(:, :, :) = 0.0_dp
+    end do
     call recall_impulses(halo, whole)
     call whole%evaluate()
     do s = 1, size(halo%view)

@@ -34,6 +34,7 @@ program test_facet_contacts
   call test_gap_in_file()
   call test_facet_piece()
   call test_box_on_floor()
+  call test_box_along_floor()
   call test_box_in_corner()
   call test_box_over_edge()
   call test_square_on_line()
@@ -285,18 +286,20 @@ contains
     call check(.not. lies_flat(sheet, found), "a facet stands across it")
   end subroutine test_facet_piece
 
-  !> A box whose ball has the radius 1, half as high as it is wide.
-  subroutine make_box(piece)
+  !> A box, over the radius of its ball.
+  subroutine make_box(piece, a, b, c, rounding)
     type(convex_piece_t), intent(out) :: piece
+    !> half of its sides, and its rounding
+    real(dp), intent(in) :: a, b, c, rounding
     type(body_shape_t) :: shape
     type(error_t), allocatable :: error
     real(dp) :: point(3, 8)
     integer :: k
 
     do k = 0, 7
-      call set(point(:, k + 1), sign(1.0_dp, btest_sign(k, 0)), sign(0.8_dp, btest_sign(k, 1)), sign(0.5_dp, btest_sign(k, 2)))
+      call set(point(:, k + 1), sign(a, btest_sign(k, 0)), sign(b, btest_sign(k, 1)), sign(c, btest_sign(k, 2)))
     end do
-    call make_polyhedron("box", point, 0.03_dp, shape, error)
+    call make_polyhedron("box", point, rounding, shape, error)
     call check(.not. allocated(error), "a box")
     piece = shape%piece(1)
   end subroutine make_box
@@ -313,6 +316,33 @@ contains
     standing = maxval(piece%corner(3, :))
   end function standing
 
+  !> A box touches a floor in four points wherever it stands on its cuts, also where rounding puts points of a cut before or behind
+  !> its corners along a side: its axes and those of the floor differ by rounding.
+  subroutine test_box_along_floor()
+    type(convex_piece_t) :: piece
+    type(near_facets_t) :: near
+    type(facet_contacts_t) :: found
+    real(dp), parameter :: radius = 0.27_dp
+    real(dp) :: normal(3), first(3), second(3), centre(3), yaw
+    integer :: k, others
+
+    call make_box(piece, 0.2_dp, 0.15_dp, 0.1_dp, 0.005_dp)
+    others = 0
+    do k = 1, 20000
+      yaw = 3.0_dp*random()
+      call set(normal, 1.0e-16_dp*random(), 1.0e-16_dp*random(), 1.0_dp)
+      call set(first, cos(yaw), -sin(yaw), -cos(yaw)*normal(1) + sin(yaw)*normal(2))
+      call set(second, sin(yaw), cos(yaw), -sin(yaw)*normal(1) - cos(yaw)*normal(2))
+      centre(:) = radius*(-standing(piece)*normal + 0.3_dp*random()*first)
+      near%n = 0
+      call add_floor(near, 2, 4.0_dp*radius, centre, first, second)
+      call find_polyhedron_contacts(piece, radius, near, 0.02_dp*radius, 8, found)
+      if (found%n /= 1) others = others + 1
+      if (found%n == 1) others = others + merge(0, 1, found%manifold(1)%n == 4)
+    end do
+    call check_equal(others, 0, "four points along a floor")
+  end subroutine test_box_along_floor
+
   !> On a floor that is cut in any way a box touches in the points in which it touches a plane, at rest and a little turned.
   subroutine test_box_on_floor()
     type(convex_piece_t) :: piece
@@ -322,7 +352,7 @@ contains
     real(dp) :: normal(3), first(3), second(3), centre(3), tilt, distance, nearest
     integer :: m, k, l, turn
 
-    call make_box(piece)
+    call make_box(piece, 1.0_dp, 0.8_dp, 0.5_dp, 0.03_dp)
     do turn = 0, 3
       tilt = 1.0e-4_dp*turn
       call set(normal, sin(tilt), 0.0_dp, cos(tilt))
@@ -363,7 +393,7 @@ contains
     real(dp) :: half(3), low(3), centre(3)
     integer :: k, d
 
-    call make_box(piece)
+    call make_box(piece, 1.0_dp, 0.8_dp, 0.5_dp, 0.03_dp)
     do d = 1, 3
       half(d) = maxval(piece%corner(d, :))
     end do
@@ -389,7 +419,7 @@ contains
     type(facet_contacts_t) :: found
     real(dp) :: half, bottom, centre(3)
 
-    call make_box(piece)
+    call make_box(piece, 1.0_dp, 0.8_dp, 0.5_dp, 0.03_dp)
     half = maxval(piece%corner(1, :))
     bottom = -standing(piece) - 1.0e-3_dp
     call set(centre, 2.1_dp, 0.0_dp, bottom)

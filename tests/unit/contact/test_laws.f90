@@ -3,7 +3,7 @@ program test_laws
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t, collected_keys_t
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_contact_law, only: contact_law_t, contact_pair_t, unused
+  use gravier_contact_law, only: contact_law_t, contact_pair_t, unused, rounded_gap
   use gravier_coulomb_law, only: coulomb_law_t
   use gravier_frictionless_law, only: frictionless_law_t
   use gravier_none_law, only: none_law_t
@@ -249,6 +249,12 @@ contains
     call law%evaluate(pair)
     call check_terms(pair, 0.3_dp, force, 0.0_dp, "capillary: an overlap does not raise the attraction")
     call check_equal(pair%state, 1, "capillary: bodies that touch have a bridge")
+    pair = pair_at(0.2_dp*rounded_gap)
+    call law%evaluate(pair)
+    call check_equal(pair%state, 1, "capillary: bodies that touch but for rounding have a bridge")
+    pair = pair_at(0.3_dp*rounded_gap)
+    call law%evaluate(pair)
+    call check_equal(pair%state, 0, "capillary: a gap beyond rounding is one")
     pair = pair_at(0.004_dp)
     pair%state = 1
     call law%evaluate(pair)
@@ -343,7 +349,10 @@ contains
     call check_close(pair%spring%hertz, 0.0_dp, 0.0_dp, "a linear spring")
     call check_close(pair%terms%friction, 0.3_dp, 0.0_dp, "friction")
     call check_close(pair%terms%attraction, 0.2_dp, 0.0_dp, "attraction of bodies that touch")
-    pair = pair_at(0.01_dp)
+    pair = pair_at(0.2_dp*rounded_gap)
+    call law%evaluate(pair)
+    call check_close(pair%terms%attraction, 0.2_dp, 0.0_dp, "attraction of bodies that touch but for rounding")
+    pair = pair_at(0.3_dp*rounded_gap)
     call law%evaluate(pair)
     call check_close(pair%terms%attraction, 0.0_dp, 0.0_dp, "no attraction of bodies apart")
     call set_law(law, "stiffness_number stiffness_pressure", [1.0e4_dp, 50.0_dp])

@@ -24,6 +24,7 @@ contains
 
     manifold%n = size(x)
     manifold%normal(2) = 1.0_dp
+    manifold%point(:, 1:size(x)) = 0.0_dp
     manifold%point(1, 1:size(x)) = x
     manifold%gap(1:size(x)) = gap
     manifold%key(1:size(x)) = key
@@ -65,13 +66,46 @@ contains
     call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
     call check_equal(points%n, 2, "points of one pair of pieces")
     points%n = 0
+    call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.3_dp, -0.2_dp], [1, 2]), 1, 1)
+    call points%add(manifold_of([1.15_dp, 2.0_dp], [-0.1_dp, -0.3_dp], [3, 4]), 2, 1)
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
+    call check_equal(points%n, 3, "points nearer to each other than the overlap")
+    points%n = 0
     turned = manifold_of([1.0_dp], [0.1_dp], [1])
     call points%add(turned, 1, 1)
     turned%normal(:) = [1.0_dp, 0.0_dp, 0.0_dp]
     call points%add(turned, 2, 1)
     call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
     call check_equal(points%n, 2, "points with other normals")
+    call check_seam()
   end subroutine test_merge
+
+  !> Points at 0 and 1 of one piece, at 1 and 1.2 or at 1.2 and 2 of another, with seams of 0.3: those at 1.2 are one with that at 1
+  !> unless both pieces have a point there, whichever of the two there is deeper by rounding.
+  subroutine check_seam()
+    type(pair_points_t) :: points
+    real(dp), parameter :: seam(2) = [0.3_dp, 0.0_dp], rounding(3) = [0.0_dp, 1.0e-15_dp, -1.0e-15_dp]
+    real(dp) :: gaps(2)
+    integer :: k
+
+    call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
+    call points%add(manifold_of([1.2_dp, 2.0_dp], [-0.04_dp, -0.01_dp], [3, 4]), 2, 1)
+    call points%merge_near(1.0e-6_dp, seam)
+    call check_equal(points%n, 3, "points at a seam are one")
+    call check_close(points%gap(2), -0.05_dp, 0.0_dp, "the deeper one at a seam")
+    do k = 1, size(rounding)
+      points%n = 0
+      gaps(1) = -0.05_dp + rounding(k)
+      gaps(2) = -0.04_dp
+      call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
+      call points%add(manifold_of([1.0_dp, 1.2_dp], gaps, [3, 4]), 2, 1)
+      call points%merge_near(1.0e-6_dp, seam)
+      call check_equal(points%n, 3, "a piece has two points beside each other")
+      call check_close(points%gap(2), -0.05_dp, 0.0_dp, "of points that are one and as deep the first")
+      call check_equal(points%key(2, 2), feature_base + 1, "it is that of the first piece")
+      call check_close(points%gap(3), -0.04_dp, 0.0_dp, "the other one of the second piece")
+    end do
+  end subroutine check_seam
 
   subroutine test_deepest()
     type(pair_points_t) :: points
