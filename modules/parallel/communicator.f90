@@ -12,6 +12,7 @@ module gravier_communicator
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_process, only: pause_for, end_at_once
+  use gravier_lone_process, only: ease_start
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -71,7 +72,9 @@ contains
     if (.not. parallel) ignored = c_atexit(c_funloc(end_early))
     parallel = .true.
     call MPI_Initialized(running)
-    if (.not. running) call MPI_Init()
+    if (running) return
+    call ease_start()
+    call MPI_Init()
   end subroutine start_parallel
 
   !> Start MPI for a library in the process of another program, unless that has started it. Failure (status_input): MPI has been

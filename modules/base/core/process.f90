@@ -1,9 +1,9 @@
-!> What a process does with itself: it leaves its processor to others for a while, or ends at once.
+!> What a process does with itself: it leaves its processor to others for a while, tells libraries something, or ends at once.
 module gravier_process
-  use, intrinsic :: iso_c_binding, only: c_int
+  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char
   implicit none
   private
-  public :: pause_for, end_at_once
+  public :: pause_for, suggest_environment, end_at_once
 
   interface
     integer(c_int) function c_usleep(microseconds) bind(C, name="usleep")
@@ -11,6 +11,13 @@ module gravier_process
       implicit none
       integer(c_int), value :: microseconds
     end function c_usleep
+
+    integer(c_int) function c_setenv(name, value, overwrite) bind(C, name="setenv")
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: name(*), value(*)
+      integer(c_int), value :: overwrite
+    end function c_setenv
 
     subroutine c_exit_now(status) bind(C, name="_exit")
       import :: c_int
@@ -27,6 +34,13 @@ contains
     integer(c_int) :: ignored
     ignored = c_usleep(microseconds)
   end subroutine pause_for
+
+  !> Set a variable of the environment of this process, unless it is set.
+  subroutine suggest_environment(name, value)
+    character(len=*), intent(in) :: name, value
+    integer(c_int) :: ignored
+    ignored = c_setenv(name//c_null_char, value//c_null_char, 0_c_int)
+  end subroutine suggest_environment
 
   !> End with a status, without what libraries do at the end of a program.
   subroutine end_at_once(status)

@@ -1,11 +1,13 @@
 !> Modules of a few lines: what numbers a scene may have, pauses, memory that stays with the process, the planes that shut a scene
 !> in.
 program test_small_modules
+  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char
   use, intrinsic :: iso_fortran_env, only: int64
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_bounded, is_size, sharpest
-  use gravier_process, only: pause_for
+  use gravier_process, only: pause_for, suggest_environment
+  use gravier_lone_process, only: ease_start
   use gravier_allocator_tuning, only: keep_heap
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
@@ -15,8 +17,17 @@ program test_small_modules
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
+  interface
+    integer(c_int) function c_unsetenv(name) bind(C, name="unsetenv")
+      import :: c_int, c_char
+      implicit none
+      character(kind=c_char), intent(in) :: name(*)
+    end function c_unsetenv
+  end interface
+
   call check_magnitudes()
   call check_pause()
+  call check_lone_process()
   call check_heap()
   call check_facing_planes()
   call check(first_of(4, [1, 1, 3, 2]) == 1 .and. first_of(3, [1, 1, 3, 2]) == 3, "the first of a set")
@@ -36,6 +47,45 @@ contains
       & "numbers that are no sizes")
     call check_close(sharpest, 1.0e10_dp, 0.0_dp, "radii of the smallest grain that a scene may extend over")
   end subroutine check_magnitudes
+
+  !> A process that no launcher has started suggests something to Open MPI, but for what the user has said; another one nothing.
+  subroutine check_lone_process()
+    character(len=*), parameter :: isolated = "OMPI_MCA_ess_singleton_isolated", pml = "OMPI_MCA_pml"
+    character(len=*), parameter :: launchers(*) = [character(len=21) :: "PMIX_RANK", "PMIX_NAMESPACE", "PMI_RANK", "PMI_FD", &
+      & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
+    integer(c_int) :: ignored
+    integer :: k
+
+    do k = 1, size(launchers)
+      ignored = c_unsetenv(trim(launchers(k))//c_null_char)
+    end do
+    ignored = c_unsetenv(isolated//c_null_char)
+    ignored = c_unsetenv(pml//c_null_char)
+    do k = 1, size(launchers)
+      call suggest_environment(trim(launchers(k)), "0")
+      call ease_start()
+      call check(value_of(isolated) == "" .and. value_of(pml) == "", "started by "//trim(launchers(k)))
+      ignored = c_unsetenv(trim(launchers(k))//c_null_char)
+    end do
+    call suggest_environment(pml, "of the user")
+    call ease_start()
+    call check(value_of(isolated) == "1", "a process that is alone")
+    call check(value_of(pml) == "of the user", "what the user says")
+    ignored = c_unsetenv(pml//c_null_char)
+    call ease_start()
+    call check(value_of(pml) == "ob1", "no network is looked for")
+  end subroutine check_lone_process
+
+  !> Of a variable of the environment, empty where it is not set.
+  function value_of(name) result(value)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: value
+    character(len=80) :: buffer
+    integer :: length
+
+    call get_environment_variable(name, buffer, length)
+    value = buffer(1:length)
+  end function value_of
 
   !> A pause takes its time, and not seconds more.
   subroutine check_pause()
