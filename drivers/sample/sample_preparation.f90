@@ -216,7 +216,7 @@ contains
     integer :: b
 
     call log%line("sample      "//to_text(simulation%n_grains)//" grains, solid fraction "// &
-      & fixed(solid_fraction(simulation), 4)//", coordination "//fixed(coordination(simulation), 3)// &
+      & fixed(solid_fraction(simulation), 4)//", contacts per grain "//fixed(contacts_per_grain(simulation), 3)// &
       & ", largest overlap "//fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii, "// &
       & to_text(simulation%step)//" steps", error)
     if (simulation%config%sample%preparation == "compacted") then
@@ -289,7 +289,7 @@ contains
   end function solid_fraction
 
   !> Mean number of contacts of a grain that bear an impulse. Collective.
-  real(dp) function coordination(simulation)
+  real(dp) function contacts_per_grain(simulation)
     type(simulation_t), intent(in) :: simulation
     integer(i8) :: ends
     integer :: s, c
@@ -302,8 +302,8 @@ contains
         end do
       end associate
     end do
-    coordination = real(simulation%comm%total(ends), dp)/real(simulation%n_grains, dp)
-  end function coordination
+    contacts_per_grain = real(simulation%comm%total(ends), dp)/real(simulation%n_grains, dp)
+  end function contacts_per_grain
 
   !> The last word: is the sample at rest, and where is it.
   subroutine write_verdict(simulation, log, rest, kept, error)

@@ -54,7 +54,7 @@ contains
         position(:, b) = place(1:nd)
         normal(:, b) = 0.0_dp
         if (boundaries(b)%is_plane()) normal(:, b) = boundaries(b)%surface%axis(1:nd)
-        velocity(1:nd, b) = boundaries(b)%velocity(1:nd)
+        call boundaries(b)%velocity_at(position(:, b), velocity(1:nd, b))
         velocity(nd + 1:, b) = boundaries(b)%spin(merge(3, 1, nd == 2):)
         force(:, b) = simulation%boundary_impulses(:, b)/simulation%physics%h
       end do

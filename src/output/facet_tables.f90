@@ -55,7 +55,7 @@ contains
     type(field_list_t), intent(out) :: table
     integer(i8), allocatable :: corners(:, :), boundary(:, :), facet(:, :)
     real(dp), allocatable :: points(:, :), velocity(:, :)
-    real(dp) :: corner(3, simulation%decomposition%nd)
+    real(dp) :: corner(3, simulation%decomposition%nd), centre(3)
     integer :: b, k, c, n, nd
 
     nd = simulation%decomposition%nd
@@ -75,8 +75,10 @@ contains
           boundary(1, n) = boundaries(b)%id
           facet(1, n) = k
           corners(1, n) = nd
-          velocity(:, n) = boundaries(b)%velocity
           call boundaries(b)%surface%get_facet(k, corner)
+          centre(:) = sum(corner, 2)/nd
+          velocity(:, n) = 0.0_dp
+          call boundaries(b)%velocity_at(centre(1:nd), velocity(1:nd, n))
           do c = 1, nd
             points(3*c - 2:3*c, n) = corner(:, c)
           end do

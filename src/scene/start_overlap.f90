@@ -103,7 +103,7 @@ contains
         if (j < 0) then
           if (decomposition%boundaries(-j)%remove_at <= simulation%time) return
         end if
-        call work%init(decomposition%nd, 0.0_dp)
+        call work%init(decomposition%nd, 0.0_dp, counts=.false.)
         call find_points(view, decomposition, p, work, points)
         smaller = decomposition%figures%half_thickness_of(bodies, i)
         if (j > 0) smaller = min(smaller, decomposition%figures%half_thickness_of(bodies, j))

@@ -331,6 +331,25 @@ class Shapes(RunTestCase):
                 check = gravier("--check", "case.nml", directory=directory)
                 self.assertEqual(fast in check.stdout, fast in words)
 
+    def test_pressure_across_a_period(self):
+        """Three bricks stacked across the side of a period have the pressures and the chains that they have in its middle. Each contact has
+        two segments but for those with the ground."""
+        shape = "shape brick\npolygon -0.01 -0.006 0.01 -0.006 0.01 0.006 -0.01 0.006\n"
+        for key, more in (("period", [0.06, 0.0]), ("period(1)", 0.06)):
+            found = []
+            for shift in (0.0, 0.03):
+                places = [(0.057 + shift) % 0.06, (0.003 + shift) % 0.06, (0.057 + shift) % 0.06]
+                rows = "".join(f"{k + 1},{x!r},{0.006 + 0.012 * k!r},brick,,\n" for k, x in enumerate(places))
+                directory = self.prepare(f"period {key} {shift}", shape, "id,x,y,shape,nx,ny\n" + rows + "4,0,0,plane,0,1\n")
+                run = run_case(merged(CASE, {"scene": {key: more, "friction": 0.5, "gravity": [0.0, -9.81]}, "time": {"step": 1e-3, "steps": 20}, "output": {"every": 20, "contacts": True},
+                                             "solver": {"accuracy": 1e-6, "tolerance": 1e-7}}), 1, directory)
+                self.assert_status(run, 0)
+                results = package.Run(run.path("results"))
+                found.append(results.pressure())
+                self.assertEqual(len(results.chains()[0]), 10)
+            np.testing.assert_allclose(found[0], found[1], rtol=1e-4)
+            np.testing.assert_allclose(found[0][2], found[0][0] / 5.0, rtol=1e-4)
+
     def test_ends_that_turn_fast(self):
         """A needle that turns by half a radian in a step passes through another one: it is counted and warned of; by 0.004 rad it is not."""
         needles = "id,x,y,shape,angle,omega,radius\n1,0,0,rod,-1.5,50,\n2,1.5,0,rod,0,0,\n"

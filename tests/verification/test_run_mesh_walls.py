@@ -3,6 +3,7 @@ of chords, boxes on floors, walls that are driven or loaded, floors as wide as t
 import os
 import unittest
 
+import h5py
 import numpy as np
 
 from gravier_runs import RunTestCase, each, merged, run_case, write
@@ -266,14 +267,21 @@ class MeshWalls(RunTestCase):
                     directory = self.here(f"{title} {wall['shape']}")
                     os.makedirs(directory, exist_ok=True)
                     write(os.path.join(directory, "drive.csv"), "time,vx,vz\n0,0,0\n0.05,1,0.2\n0.1,-1,-0.2\n0.2,0.5,0\n")
-                scene = {"time": {"steps": 110}}
+                scene = {"time": {"steps": 110}, "output": {"vtk": True}}
                 wanted = self.play(f"{title} rectangle", 3, rows, [{**rectangle, **keys}], scene)
                 # the pivot of a rectangle is its corner unless told
                 found = self.play(f"{title} mesh", 3, rows, [{**MESH, **keys}], scene, mesh=quadrangles(np.array(grid)))
                 self.same(wanted, found)
                 np.testing.assert_allclose(found.all("boundaries/force"), wanted.all("boundaries/force"), rtol=0, atol=1e-6)
-                np.testing.assert_allclose(found.all("boundaries/velocity"), wanted.all("boundaries/velocity"), rtol=0, atol=1e-9)
+                # both at the origin: they are written at the corner of the rectangle, and where the mesh has its point
+                of_found, of_wanted = (run.all("boundaries/velocity") - np.pad(np.cross(run.all("boundaries/velocity")[..., 3:], run.all("boundaries/position")),
+                                                                               ((0, 0), (0, 0), (0, 3))) for run in (found, wanted))
+                np.testing.assert_allclose(of_found, of_wanted, rtol=0, atol=1e-9)
                 if title == "rotation":
+                    with h5py.File(os.path.join(found.directory, "results", "boundaries.vtkhdf")) as file:
+                        cells = file["VTKHDF/CellData/velocity"][:]
+                        centres = file["VTKHDF/Points"][:].reshape(-1, 3, 3).mean(axis=1)
+                    np.testing.assert_allclose(cells, np.cross(keys["rotation"], centres - keys["pivot"]), atol=1e-6)
                     self.has_turned(found.directory, np.array(grid), np.array(keys["rotation"]) * 110 / 512, np.array(keys["pivot"]))
         axes = found.all("boundaries/axes")[:, 0].reshape(-1, 3, 3)
         np.testing.assert_allclose(axes @ np.transpose(axes, (0, 2, 1)), np.broadcast_to(np.eye(3), axes.shape), atol=1e-12)

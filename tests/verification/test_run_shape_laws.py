@@ -296,6 +296,33 @@ class ShapeLaws(RunTestCase):
                     else:
                         self.assertGreater(apart, 1e-3)
 
+    def test_equal_faces_that_attract(self):
+        """Three equal cubes hang in a row on a wall and bear a fifth of what their bonds or their cohesion do, at default settings. What solves
+        leave of velocities shifts and turns their faces a little against each other: they stay joined in four points each, at which their
+        attractions act. Faces that differ by rounding alone had up to eight points, bonds were lost, and the row fell."""
+        rows = [body("block", [0.05 + 0.1 * k, 0.0, 0.0], STILL[3], mass=1.0) for k in range(3)]
+        wall = [{"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [1.0, 0.0, 0.0], "material": "m"}]
+        for kind, keys in (("bonded", {"bond_strength": 75.0, "bond_friction": 5.0, "bond_distance": 1e-5}), ("adhesive", {"adhesion": 75.0, "adhesion_range": 1e-3})):
+            with self.subTest(kind):
+                directory = prepare(self.here(f"equal faces {kind}"), 3, rows, "shape block\nrounding 0.002\nbox 0.1 0.1 0.1\n")
+                run = run_case(shaped_case(3, wall, {"material": [{"name": "m"}], "law": [{"materials": "m", "kind": kind, "friction": 0.3, **keys}],
+                                                     "scene": {"gravity": [20.0, 0.0, 0.0]}, "time": {"steps": 800, "step": 1e-3}, "output": {"every": 800}}), 1, directory)
+                self.assert_status(run, 0)
+                self.assertEqual(set(run.history()["contacts"]), {12.0})
+                np.testing.assert_allclose(self.track(run, place=2)[-1], [0.25, 0.0, 0.0], atol=1e-4)
+
+    def test_equal_faces_on_springs(self):
+        """A cube that is turned by 0.0005 to 0.005 rad about the vertical on an equal one stands on four springs, as if it were not turned."""
+        for turn in (0.0, 5e-4, 5e-3):
+            with self.subTest(turn=turn):
+                rows = [body("block", [0.0, 0.0, 0.05], STILL[3], mass=1.0), body("block", [0.0, 0.0, 0.15], [np.cos(turn / 2), 0.0, 0.0, np.sin(turn / 2)], mass=1.0)]
+                directory = prepare(self.here(f"twist {turn}"), 3, rows, "shape block\nrounding 0.002\nbox 0.1 0.1 0.1\n")
+                law = {"materials": "m", "kind": "elastic", "friction": 0.5, "normal_stiffness": 1e5, "spring_restitution": 0.1}
+                run = run_case(shaped_case(3, [{**plane(3), "material": "m"}], {"material": [{"name": "m"}], "law": [law], "solver": {"accuracy": 1e-4}, "output": {"every": 600},
+                                                                                 "time": {"steps": 600, "step": 5e-4}}), 1, directory)
+                self.assert_status(run, 0)
+                np.testing.assert_allclose([self.track(run, place=k)[-1, 2] for k in (0, 1)], [0.05 - 2 * G / 4e5, 0.15 - 3 * G / 4e5], atol=2e-7)
+
     def test_edges(self):
         """Blocks on both sides of a segment or a rectangle, across its end, and under its corner, rest or pass; one that lies beyond it falls."""
         for dimension in (2, 3):

@@ -1,5 +1,6 @@
 """What a run left in its directory, as numpy arrays."""
 import csv
+import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -282,7 +283,7 @@ class Run:
         bodies, contacts = self.bodies(step), self._contacts_or_error(step)
         row, other = self._rows(bodies, contacts)
         if "point" in contacts:
-            body, contact, arm = self._arms(bodies, contacts)
+            body, contact, arm = self._arms(step, bodies, contacts)
             segments = np.stack([bodies.position[body], bodies.position[body] + arm], axis=1)
             return segments, contacts.impulse[contact, 0] / self.time_step()
         reach = bodies.radius[row] + contacts.gap + np.where(other >= 0, bodies.radius[other], 0.0)
@@ -297,7 +298,7 @@ class Run:
         row, other = self._rows(bodies, contacts)
         force = contacts.impulse[:, 0] / self.time_step()
         if "point" in contacts:
-            body, contact, arm = self._arms(bodies, contacts)
+            body, contact, arm = self._arms(step, bodies, contacts)
             sign = np.where(bodies.id[body] == contacts.candidate[contact], -1.0, 1.0)
             total = np.bincount(body, sign * force[contact] * (arm * contacts.normal[contact]).sum(axis=1), len(bodies))
             volume = np.array([shape.volume for shape in [ball(self.dimension), *self.shapes()]])[bodies.shape]
@@ -334,14 +335,32 @@ class Run:
             raise ResultsError(f"{self.path}: no contacts in step {self.find_step(step)}; &output contacts = .true. writes them")
         return contacts
 
-    def _arms(self, bodies, contacts):
-        """Row of the body, row of the contact and way from the centre to the contact, of both bodies of all contacts. What lies outside
-        the body belongs to an image of it, and is left out."""
+    def _arms(self, step, bodies, contacts):
+        """Row of the body, row of the contact and way from the centre to the contact, of both bodies of all contacts; of the images of a
+        body in a periodic scene the one that is nearest to the contact counts."""
         row, other = self._rows(bodies, contacts)
         body, contact = np.concatenate([row, other]), np.tile(np.arange(len(contacts)), 2)
+        body, contact = body[body >= 0], contact[body >= 0]
         arm = contacts.point[contact] - bodies.position[body]
-        near = (body >= 0) & (np.linalg.norm(arm, axis=1) <= 1.1 * bodies.radius[body])
-        return body[near], contact[near], arm[near]
+        for edge in self._edges(step):
+            images = np.stack([arm, arm - edge, arm + edge])
+            arm = images[np.argmin(np.linalg.norm(images, axis=2), axis=0), np.arange(len(arm))]
+        return body, contact, arm
+
+    def _edges(self, step):
+        """The edges of the period, a row each; those that lean come last first, so that each may be left without changing others' axes."""
+        cell = self.cell(step)
+        if cell is not None:
+            return cell.edge[::-1]
+        period = np.zeros(self.dimension)
+        for key, value in self.case.get("scene", [{}])[0].items():
+            axis = re.fullmatch(r"period(?:\((\d)\))?", key)
+            if axis:
+                first = int(axis[1] or 1) - 1
+                for place, length in enumerate(np.atleast_1d(np.array(value, dtype=float)), first):
+                    if place < self.dimension and np.isfinite(length):
+                        period[place] = length
+        return np.diag(period)[period > 0]
 
     @staticmethod
     def _rows(bodies, contacts):

@@ -38,6 +38,7 @@ module gravier_contact_spring
   contains
     procedure :: damp => spring_step_damp
     procedure :: law => spring_step_law
+    procedure :: carried => spring_step_carried
     procedure :: elongation => spring_step_elongation
   end type spring_step_t
 
@@ -106,24 +107,35 @@ contains
     end associate
   end function spring_step_law
 
-  !> Elongation of a tangential spring that carries the impulse r, at the q_m of the next step if the velocity stayed what it is at
-  !> the end of this one [m]. While a contact slides, a linear spring carries r less the force of the dashpot, as in codes of smooth
-  !> DEM. A spring whose stiffness grows with the compression carries all of r. Its elongation would otherwise hold the force of the
-  !> dashpot over the stiffness of this step; with a larger stiffness in the next steps the spring would push along the sliding.
-  pure real(dp) function spring_step_elongation(self, d, h, impulse, velocity, slides) result(elongation)
+  !> Elongation x_f of a tangential spring that carries the impulse r, at the weighted instant of the step [m]. While a contact
+  !> slides, a linear spring carries r less the force of the dashpot, as in codes of smooth DEM. A spring whose stiffness grows with
+  !> the compression carries all of r. Its elongation would otherwise hold the force of the dashpot over the stiffness of this step;
+  !> with a larger stiffness in the next steps the spring would push along the sliding.
+  pure real(dp) function spring_step_carried(self, d, h, impulse, velocity, slides) result(elongation)
     class(spring_step_t), intent(in) :: self
     !> direction: 2 or 3
     integer, intent(in) :: d
     !> [s], r [N s], v at the end of the step [m/s]
     real(dp), intent(in) :: h, impulse, velocity
     logical, intent(in) :: slides
-    real(dp) :: rest, damped
+    real(dp) :: damped
+
+    damped = self%dashpot(2)*((1.0_dp - self%spring%weight)*self%velocity(d) + self%spring%weight*velocity)
+    if (slides .and. self%spring%hertz > 0.0_dp) damped = 0.0_dp
+    elongation = -(impulse/h + damped)/self%spring%stiffness(2)
+  end function spring_step_carried
+
+  !> The same elongation at the q_m of the next step, if the bodies stuck together and their velocity stayed what it is at the end
+  !> of this one [m]. A contact that slides on is brought back to its bound by the law of that step.
+  pure real(dp) function spring_step_elongation(self, d, h, impulse, velocity, slides) result(elongation)
+    class(spring_step_t), intent(in) :: self
+    integer, intent(in) :: d
+    real(dp), intent(in) :: h, impulse, velocity
+    logical, intent(in) :: slides
 
     associate (phi => self%spring%weight)
-      rest = 1.0_dp - phi
-      damped = self%dashpot(2)*(rest*self%velocity(d) + phi*velocity)
-      if (slides .and. self%spring%hertz > 0.0_dp) damped = 0.0_dp
-      elongation = -(impulse/h + damped)/self%spring%stiffness(2) + h*((1.0_dp - phi**2)*velocity + rest**2*self%velocity(d))
+      elongation = self%carried(d, h, impulse, velocity, slides) &
+        & + h*((1.0_dp - phi**2)*velocity + (1.0_dp - phi)**2*self%velocity(d))
     end associate
   end function spring_step_elongation
 

@@ -5,7 +5,7 @@ module gravier_contact_patch
   use gravier_manifold, only: manifold_t, most_points
   implicit none
   private
-  public :: patch_point_t, add_point, fill_manifold
+  public :: patch_point_t, add_point, keep_outline, fill_manifold
 
   !> A point of a patch.
   type :: patch_point_t
@@ -47,6 +47,111 @@ contains
     n = n + 1
     point(n) = new
   end subroutine add_point
+
+  !> Keep those points that the convex hull of all has as corners (A. M. Andrew, Inf. Process. Lett. 9 (1979) 216): forces there can
+  !> be any that forces at all points can. The chain goes along the longest way between two points: along a side that is across it,
+  !> rounding would decide which point comes first.
+  pure subroutine keep_outline(near, n, point)
+    !> points this near to the line of two others lie on it [m]
+    real(dp), intent(in) :: near
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    integer :: order(n), chain(2*n), k, l, m, first, kept
+    logical :: stays(n)
+    real(dp) :: axis(2), along(n), across(n)
+
+    if (n < 3) return
+    call find_longest(n, point, axis)
+    do k = 1, n
+      along(k) = axis(1)*point(k)%place(1) + axis(2)*point(k)%place(2)
+      across(k) = axis(1)*point(k)%place(2) - axis(2)*point(k)%place(1)
+    end do
+    do k = 1, n
+      kept = k
+      l = k
+      do while (l > 1)
+        if (.not. is_before(kept, order(l - 1))) exit
+        order(l) = order(l - 1)
+        l = l - 1
+      end do
+      order(l) = kept
+    end do
+    m = 0
+    first = 1
+    do k = 1, n
+      call extend(order(k), first, m, chain)
+    end do
+    first = m
+    do k = n - 1, 1, -1
+      call extend(order(k), first, m, chain)
+    end do
+    stays(:) = .false.
+    do k = 1, m
+      stays(chain(k)) = .true.
+    end do
+    m = 0
+    do k = 1, n
+      if (.not. stays(k)) cycle
+      m = m + 1
+      point(m) = point(k)
+    end do
+    n = m
+
+  contains
+
+    pure logical function is_before(a, b)
+      integer, intent(in) :: a, b
+
+      is_before = along(a) < along(b)
+      if (.not. is_before .and. .not. along(b) < along(a)) is_before = across(a) < across(b)
+    end function is_before
+
+    !> Go on with the chain to a point, past those that do not stick out to its right.
+    pure subroutine extend(next, first, m, chain)
+      integer, intent(in) :: next
+      !> place behind which the chain may be shortened
+      integer, intent(in) :: first
+      integer, intent(inout) :: m, chain(:)
+      real(dp) :: u(2), v(2)
+
+      do while (m > first)
+        u(:) = point(chain(m))%place(1:2) - point(chain(m - 1))%place(1:2)
+        v(:) = point(next)%place(1:2) - point(chain(m - 1))%place(1:2)
+        if (u(1)*v(2) - u(2)*v(1) > near*norm2(v)) exit
+        m = m - 1
+      end do
+      m = m + 1
+      chain(m) = next
+    end subroutine extend
+
+  end subroutine keep_outline
+
+  !> The way between two points of which each is the farthest from the other.
+  pure subroutine find_longest(n, point, way)
+    !> 1 or more
+    integer, intent(in) :: n
+    type(patch_point_t), intent(in) :: point(:)
+    real(dp), intent(out) :: way(2)
+    real(dp) :: length, longest
+    integer :: here, there, k
+
+    way(:) = 0.0_dp
+    longest = -1.0_dp
+    there = 1
+    do
+      here = there
+      length = longest
+      do k = 1, n
+        associate (square => sum((point(k)%place(1:2) - point(here)%place(1:2))**2))
+          if (.not. square > longest) cycle
+          longest = square
+          way(:) = point(k)%place(1:2) - point(here)%place(1:2)
+          there = k
+        end associate
+      end do
+      if (.not. longest > length) return
+    end do
+  end subroutine find_longest
 
   !> The manifold of the points: at most `most` of them, in ascending order of their keys.
   pure subroutine fill_manifold(frame, size_of_pair, same_gap, most, n, point, manifold)

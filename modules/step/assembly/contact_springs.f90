@@ -119,8 +119,7 @@ contains
         do c = 1, sub%n_contacts
           associate (q => lane_of(c), g => block_of(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
-            slides = norm2(sub%impulse(q, 2:nd, g)) >= (1.0_dp - unused)*sub%hot(q, problem%kernels%row%friction, g)* &
-              & sub%impulse(q, 1, g)
+            slides = uses_its_friction(sub, problem%kernels, c)
             do d = 2, nd
               elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
@@ -137,17 +136,30 @@ contains
     end do
   end subroutine conclude_springs
 
-  !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents,
-  !> once `conclude_springs` was called. At the start elongations along the tangents are not known any more, and count as 0.
-  subroutine spring_energies(problem, k, halo, physics, energies)
+  !> Whether a contact that presses uses its friction, and slides.
+  pure logical function uses_its_friction(sub, kernels, c)
+    type(subproblem_t), intent(in) :: sub
+    type(kernels_t), intent(in) :: kernels
+    integer, intent(in) :: c
+
+    associate (q => lane_of(c), g => block_of(c))
+      uses_its_friction = norm2(sub%impulse(q, 2:kernels%nd, g)) >= (1.0_dp - unused)*sub%hot(q, kernels%row%friction, g)* &
+        & sub%impulse(q, 1, g)
+    end associate
+  end function uses_its_friction
+
+  !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents;
+  !> v_global is evaluated. At the start elongations along the tangents are not known any more, and count as 0. The spring of a
+  !> contact that slides has the elongation that its force has all the time.
+  subroutine spring_energies(problem, k, physics, energies)
     type(contact_problem_t), intent(in) :: problem
     !> place of the subdomain among those of this rank
     integer, intent(in) :: k
-    type(halo_t), intent(in) :: halo
     type(physics_t), intent(in) :: physics
     !> normal at the start; normal, tangential at the end [J]
     real(dp), intent(out) :: energies(3)
     real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
+    logical :: slides
     integer :: c, d
 
     energies(:) = 0.0_dp
@@ -163,9 +175,13 @@ contains
           energies(1) = energies(1) + own%spring%energy(before, elongation)
           energies(2) = energies(2) + own%spring%energy(after, elongation)
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
-          call recall_elongation(halo%view(k)%list, sub, c, nd, elongation)
+          slides = uses_its_friction(sub, problem%kernels, c)
           do d = 2, nd
-            elongation(d - 1) = elongation(d - 1) - (1.0_dp - theta)*h*v(q, d, g)
+            if (slides) then
+              elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
+            else
+              elongation(d - 1) = own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides) - (1.0_dp - theta)*h*v(q, d, g)
+            end if
           end do
           energies(3) = energies(3) + own%spring%energy(0.0_dp, elongation)
         end associate

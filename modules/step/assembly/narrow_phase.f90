@@ -81,7 +81,7 @@ contains
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
-    call work%init(nd, physics%h)
+    call work%init(nd, physics%h, counts=.false.)
     do w = 1, view%list%n_watched()
       p = view%list%watched_place(w)
       i = view%list%candidate(p)
@@ -147,7 +147,7 @@ contains
     type(shape_work_t) :: work
     integer :: w, p, k
 
-    call work%init(decomposition%nd, physics%h)
+    call work%init(decomposition%nd, physics%h, counts=physics%laws%attracts .or. physics%laws%yields)
     w = 1
     do while (w <= view%list%n_watched())
       p = view%list%watched_place(w)

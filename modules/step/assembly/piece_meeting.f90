@@ -15,6 +15,8 @@ module gravier_piece_meeting
   !> Room for two placed pieces of the plane, made once for many pairs.
   type :: room_t
     type(placed_piece_t) :: a, b
+    !> of placed_pair_t
+    real(dp) :: straight = 0.0_dp
   end type room_t
 
   !> Where two pieces are nearest, in global axes.
@@ -44,6 +46,7 @@ contains
       call find_polygon_manifold(room%a, room%b, alert, manifold)
     else
       call place_in_space(a, b, pair)
+      pair%straight = room%straight
       call find_polyhedron_manifold(piece_a, piece_b, pair, alert, max(face_points(piece_a), face_points(piece_b)), manifold)
       call turn_manifold(a%axes, manifold)
     end if

@@ -30,6 +30,10 @@ module gravier_shape_contacts
   !> below which it is level
   real(dp), parameter :: one_place = 1.0e-3_dp, level = 1.0e-3_dp
 
+  !> Points of a joint that attracts or yields say nothing of their own where they are this near to the line of two others, over the
+  !> radius: as many attractions or springs act between two faces that have shifted a little as before.
+  real(dp), parameter :: straight_joint = 3.0e-3_dp
+
   !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for pieces where bodies are and where they
   !> go, and for facets.
   type :: shape_work_t
@@ -46,14 +50,17 @@ module gravier_shape_contacts
 
 contains
 
-  subroutine shape_work_init(self, nd, step)
+  subroutine shape_work_init(self, nd, step, counts)
     class(shape_work_t), intent(inout) :: self
     !> 2 or 3
     integer, intent(in) :: nd
     !> [s]; 0 where only the places count
     real(dp), intent(in) :: step
+    !> it matters in how many points faces touch: some bodies attract each other, or have springs
+    logical, intent(in) :: counts
 
     self%step = step
+    self%room%straight = merge(straight_joint, 0.0_dp, counts)
     self%ball%rounding = 1.0_dp
     if (allocated(self%ball%vertex)) deallocate (self%ball%vertex, self%ball%corner, self%ball%face_first, &
       & self%ball%neighbour_first, self%ball%face_vertex, self%ball%neighbour, self%ball%face_normal)

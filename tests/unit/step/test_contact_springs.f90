@@ -66,7 +66,7 @@ contains
     type(physics_t) :: physics
     type(spring_t) :: spring
     type(spring_step_t) :: expected
-    real(dp) :: law(2), velocity(dimension), energies(3), v(dimension), kept(3)
+    real(dp) :: law(2), velocity(dimension), energies(3), v(dimension), kept(3), carried(2)
     integer :: d
 
     call make_contact(dimension, problem, halo)
@@ -119,11 +119,18 @@ contains
       call check(list%keeps(1), "a pair with an elongation is kept")
       physics%h = h
       physics%theta = 0.5_dp
-      call spring_energies(problem, 1, halo, physics, energies)
+      call spring_energies(problem, 1, physics, energies)
       call check_close(energies(1), 400.0_dp*(gap - 0.5_dp*h*velocity(1))**2*merge(1.0_dp, 0.0_dp, gap < 0.5_dp*h*velocity(1)), &
         & rounding, "normal energy at the start")
       call check_close(energies(2), 400.0_dp*max(0.0_dp, -gap - 0.5_dp*h*0.2_dp)**2, rounding, "normal energy at the end")
-      call check_close(energies(3), 150.0_dp*sum((kept(1:dimension - 1) - 0.5_dp*h*v(2:))**2), 10*rounding, "tangential energy")
+      do d = 2, dimension
+        carried(d - 1) = expected%carried(d, h, 0.7_dp, v(d), slides=.true.)
+      end do
+      call check_close(energies(3), 150.0_dp*sum(carried(1:dimension - 1)**2), 10*rounding, "tangential energy where it slides")
+      sub%hot(1, row%friction, 1) = 2.0_dp
+      call spring_energies(problem, 1, physics, energies)
+      call check_close(energies(3), 150.0_dp*sum((kept(1:dimension - 1) - 0.5_dp*h*v(2:))**2), 10*rounding, &
+        & "tangential energy where it sticks")
       sub%impulse(:, :, :) = 0.0_dp
       call conclude_springs(problem, h, halo)
       call check_close(maxval(abs(list%spring)), 0.0_dp, 0.0_dp, "a contact that carries nothing forgets")

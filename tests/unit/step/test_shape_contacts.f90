@@ -92,7 +92,7 @@ contains
     order(1:places) = 1
     order(places + 1:) = 2
     call view%list%finish(order, memory)
-    call work%init(nd, 0.0_dp)
+    call work%init(nd, 0.0_dp, counts=.false.)
   end subroutine make
 
   !> A code of a shift, 0 where there is none.
