@@ -278,7 +278,7 @@ class MeshWalls(RunTestCase):
                                                                                ((0, 0), (0, 0), (0, 3))) for run in (found, wanted))
                 np.testing.assert_allclose(of_found, of_wanted, rtol=0, atol=1e-9)
                 if title == "rotation":
-                    with h5py.File(os.path.join(found.directory, "results", "boundaries.vtkhdf")) as file:
+                    with h5py.File(os.path.join(found.directory, "boundaries.vtkhdf")) as file:
                         cells = file["VTKHDF/CellData/velocity"][:]
                         centres = file["VTKHDF/Points"][:].reshape(-1, 3, 3).mean(axis=1)
                     np.testing.assert_allclose(cells, np.cross(keys["rotation"], centres - keys["pivot"]), atol=1e-6)

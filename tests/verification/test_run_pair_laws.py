@@ -309,7 +309,7 @@ class Bonds(SmallScene):
                                    [{"name": "low", "shape": "grains", "group": 1},
                                     {"name": "high", "shape": "grains", "group": 2, "free": [bool(x) for x in up], "mass": 0.016, "table": "load.csv"}], None, 40,
                                    files={"load.csv": table}, material=named("a"), law=[bond], solver={"method": method, "criterion": "velocity_error", "tolerance": 0.01,
-                                   "check_every": 10, "warm_start": True, "max_iterations": 10000}, output={"every": 40, "boundary_forces": True},
+                                   "check_every": 10, "warm_start": True, "max_iterations": 10000}, output={"every": 40, "boundary_forces": True, "bonds": True},
                                    decomposition={"subdomains": 1 if method == "nlgs" else 4})
                 history = record.run.history()
                 force = np.abs(history[f"force_{'xyz'[dimension - 1]}:low"])
@@ -319,6 +319,10 @@ class Bonds(SmallScene):
                 torn = np.flatnonzero(force < 0.5 * whole)[0]
                 self.assertGreater(torn, 25)
                 self.assertLess(torn, 35)
+                # between the layers, and in the two that are not glued; between two layers they are torn
+                across, beside = n**(dimension - 1), (dimension - 1) * (n - 1) * n**(dimension - 2)
+                self.assertEqual(set(history["bonds"][:torn - 9]), {3 * across + 2 * beside})
+                self.assertLessEqual(history["bonds"][-1], 2 * across + 2 * beside)
         self.both(check)
 
     def test_broken_for_good(self):

@@ -10,6 +10,7 @@ program test_step_parts
   use gravier_grain_balance, only: grain_balance_t
   use gravier_mean_stress, only: mean_stress_t
   use gravier_contact_structure, only: contact_structure_t, bin_width, n_bins
+  use gravier_intact_bonds, only: intact_bonds_t
   use gravier_removal, only: some_leave, remove_grains
   use gravier_overlap_projection, only: project_overlaps
   use gravier_deep_contacts, only: deep_contacts_t
@@ -58,6 +59,7 @@ program test_step_parts
   call check_structure(3.0_dp, 0.0_dp)
   call check_structure(-0.1_dp, 3.0_dp)
   call check_crowd()
+  call check_bonds()
   call check_turning_rolling()
   call check_body_force_in_contact()
   call check_falling_lid()
@@ -551,6 +553,31 @@ contains
     call check_equal(structure%rattlers, 13_i8, "one contact holds nobody")
     call sim%free()
   end subroutine check_crowd
+
+  !> Of three disks in a row that are bonded the last is torn off: its bond gives an impulse of 0.03 N s.
+  subroutine check_bonds()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: k
+
+    do k = 1, 3
+      call add_grain(k, 1.0_dp, 0, 0.2_dp*(k - 2), 0.0_dp, merge(1.5_dp, 0.0_dp, k == 3), 0.0_dp, 0.0_dp)
+    end do
+    call make(sim, "gravity = 0, 0, overlap_projection = F /"//newline//"&time step = 0.01, steps = 9 /"//newline//exact// &
+      & " /"//newline//"&output bonds = T /"//newline//"&material name = 'rock' /"//newline//"&law materials = 'rock', "// &
+      & "kind = 'bonded', bond_strength = 3.0, bond_friction = 1.0, bond_distance = 0.01 /"//newline)
+    do k = 1, 2
+      call advance(sim, figures)
+      associate (diagnostics => sim%diagnostics)
+        select type (item => diagnostics%asked(diagnostics%place("bonds"))%diagnostic)
+        type is (intact_bonds_t)
+          call check_equal(item%bonds, 1_i8, "of two bonds one holds")
+        end select
+      end associate
+    end do
+    call check_close(grain(sim, 2, 1), 0.5_dp*3.0_dp*h, solved, "and shares what the other one bore")
+    call sim%free()
+  end subroutine check_bonds
 
   !> The scene of a boundary that turns, with resistance to rolling: its moment works on the boundary too, and the balance closes.
   subroutine check_turning_rolling()
