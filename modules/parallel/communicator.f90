@@ -12,7 +12,7 @@ module gravier_communicator
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_process, only: pause_for, end_at_once
-  use gravier_lone_process, only: ease_start
+  use gravier_lone_process, only: ease_start, start_is_over
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -66,15 +66,16 @@ contains
 
   !> Start MPI, unless it is running. A process that ends before stop_parallel, by a library that gives up, has status_failure.
   subroutine start_parallel()
-    logical :: running
+    logical :: running, eased(2)
     integer(c_int) :: ignored
 
     if (.not. parallel) ignored = c_atexit(c_funloc(end_early))
     parallel = .true.
     call MPI_Initialized(running)
     if (running) return
-    call ease_start()
+    call ease_start(eased)
     call MPI_Init()
+    call start_is_over(eased)
   end subroutine start_parallel
 
   !> Start MPI for a library in the process of another program, unless that has started it. Failure (status_input): MPI has been

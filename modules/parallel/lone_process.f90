@@ -1,28 +1,45 @@
 !> A process that no launcher of MPI has started. Open MPI starts a daemon for it and looks for networks, which takes longer than
 !> many a run; alone it needs neither. What the user's environment says stays. Other libraries of MPI do not look at these names.
 module gravier_lone_process
-  use gravier_process, only: suggest_environment
+  use gravier_process, only: suggest_environment, forget_environment
   implicit none
   private
-  public :: ease_start
+  public :: ease_start, start_is_over
 
   !> Names of which a launcher sets one: of PMIx (mpirun, prterun, srun), of PMI (Hydra, srun, Flux), of mpirun and of Cray's aprun
   !> and PALS.
   character(len=*), parameter :: launchers(*) = [character(len=21) :: "PMIX_RANK", "PMIX_NAMESPACE", "PMI_RANK", "PMI_FD", &
     & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
+  !> what is suggested: names and values
+  character(len=*), parameter :: suggested(2, 2) = reshape([character(len=31) :: &
+    & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1"], [2, 2])
 
 contains
 
   !> Suggest to Open MPI how it starts a process that is alone; before MPI_Init.
-  subroutine ease_start()
+  subroutine ease_start(eased)
+    !> which of the suggestions are new, and are to be forgotten
+    logical, intent(out) :: eased(size(suggested, 2))
     integer :: k, length
 
+    eased(:) = .false.
     do k = 1, size(launchers)
       call get_environment_variable(trim(launchers(k)), length=length)
       if (length > 0) return
     end do
-    call suggest_environment("OMPI_MCA_ess_singleton_isolated", "1")
-    call suggest_environment("OMPI_MCA_pml", "ob1")
+    do k = 1, size(eased)
+      call suggest_environment(trim(suggested(1, k)), trim(suggested(2, k)), eased(k))
+    end do
   end subroutine ease_start
+
+  !> Forget the suggestions after MPI_Init: programs that this process starts would find them.
+  subroutine start_is_over(eased)
+    logical, intent(in) :: eased(:)
+    integer :: k
+
+    do k = 1, size(eased)
+      if (eased(k)) call forget_environment(trim(suggested(1, k)))
+    end do
+  end subroutine start_is_over
 
 end module gravier_lone_process

@@ -1,13 +1,12 @@
 !> Modules of a few lines: what numbers a scene may have, pauses, memory that stays with the process, the planes that shut a scene
 !> in.
 program test_small_modules
-  use, intrinsic :: iso_c_binding, only: c_int, c_char, c_null_char
   use, intrinsic :: iso_fortran_env, only: int64
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_positive_inf
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_bounded, is_size, sharpest
-  use gravier_process, only: pause_for, suggest_environment
-  use gravier_lone_process, only: ease_start
+  use gravier_process, only: pause_for, suggest_environment, forget_environment
+  use gravier_lone_process, only: ease_start, start_is_over
   use gravier_allocator_tuning, only: keep_heap
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
@@ -16,14 +15,6 @@ program test_small_modules
   use gravier_test_scenes, only: plane, change_shape
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
-
-  interface
-    integer(c_int) function c_unsetenv(name) bind(C, name="unsetenv")
-      import :: c_int, c_char
-      implicit none
-      character(kind=c_char), intent(in) :: name(*)
-    end function c_unsetenv
-  end interface
 
   call check_magnitudes()
   call check_pause()
@@ -53,27 +44,32 @@ contains
     character(len=*), parameter :: isolated = "OMPI_MCA_ess_singleton_isolated", pml = "OMPI_MCA_pml"
     character(len=*), parameter :: launchers(*) = [character(len=21) :: "PMIX_RANK", "PMIX_NAMESPACE", "PMI_RANK", "PMI_FD", &
       & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
-    integer(c_int) :: ignored
+    logical :: is_new, eased(2)
     integer :: k
 
     do k = 1, size(launchers)
-      ignored = c_unsetenv(trim(launchers(k))//c_null_char)
+      call forget_environment(trim(launchers(k)))
     end do
-    ignored = c_unsetenv(isolated//c_null_char)
-    ignored = c_unsetenv(pml//c_null_char)
+    call forget_environment(isolated)
+    call forget_environment(pml)
     do k = 1, size(launchers)
-      call suggest_environment(trim(launchers(k)), "0")
-      call ease_start()
+      call suggest_environment(trim(launchers(k)), "0", is_new)
+      call ease_start(eased)
       call check(value_of(isolated) == "" .and. value_of(pml) == "", "started by "//trim(launchers(k)))
-      ignored = c_unsetenv(trim(launchers(k))//c_null_char)
+      call forget_environment(trim(launchers(k)))
     end do
-    call suggest_environment(pml, "of the user")
-    call ease_start()
+    call suggest_environment(pml, "of the user", is_new)
+    call check(is_new, "a variable that was not set")
+    call ease_start(eased)
     call check(value_of(isolated) == "1", "a process that is alone")
     call check(value_of(pml) == "of the user", "what the user says")
-    ignored = c_unsetenv(pml//c_null_char)
-    call ease_start()
+    call start_is_over(eased)
+    call check(value_of(isolated) == "" .and. value_of(pml) == "of the user", "what was suggested is forgotten")
+    call forget_environment(pml)
+    call ease_start(eased)
     call check(value_of(pml) == "ob1", "no network is looked for")
+    call start_is_over(eased)
+    call check(value_of(pml) == "", "programs that it starts may do so")
   end subroutine check_lone_process
 
   !> Of a variable of the environment, empty where it is not set.
