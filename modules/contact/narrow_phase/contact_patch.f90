@@ -5,7 +5,7 @@ module gravier_contact_patch
   use gravier_manifold, only: manifold_t, most_points
   implicit none
   private
-  public :: patch_point_t, add_point, keep_outline, fill_manifold
+  public :: patch_point_t, add_point, keep_outline, leave_corners, fill_manifold
 
   !> A point of a patch.
   type :: patch_point_t
@@ -57,7 +57,6 @@ contains
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
     integer :: order(n), chain(2*n), k, l, m, first, kept
-    logical :: stays(n)
     real(dp) :: axis(2), along(n), across(n)
 
     if (n < 3) return
@@ -85,17 +84,7 @@ contains
     do k = n - 1, 1, -1
       call extend(order(k), first, m, chain)
     end do
-    stays(:) = .false.
-    do k = 1, m
-      stays(chain(k)) = .true.
-    end do
-    m = 0
-    do k = 1, n
-      if (.not. stays(k)) cycle
-      m = m + 1
-      point(m) = point(k)
-    end do
-    n = m
+    call keep_only(chain(1:m), n, point)
 
   contains
 
@@ -152,6 +141,82 @@ contains
       if (.not. longest > length) return
     end do
   end subroutine find_longest
+
+  !> Of the corners of a convex patch leave out those that are almost on the line of their neighbours, the straightest first, as
+  !> long as there are more than some. Two faces that are equal but for a small shift and turn have up to all corners of both.
+  pure subroutine leave_corners(near, least, n, point)
+    !> corners this near to the line of their neighbours may go [m]
+    real(dp), intent(in) :: near
+    !> how many stay at least
+    integer, intent(in) :: least
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    integer :: order(n), k, m, straightest
+    real(dp) :: angle(n), centre(2), off(n)
+
+    if (n <= max(least, 2)) return
+    do k = 1, 2
+      centre(k) = sum(point(1:n)%place(k))/n
+    end do
+    do k = 1, n
+      angle(k) = atan2(point(k)%place(2) - centre(2), point(k)%place(1) - centre(1))
+    end do
+    call argsort_reals(angle, order)
+    m = n
+    do while (m > max(least, 2))
+      do k = 1, m
+        off(k) = distance_from_line(point(order(k)), point(order(modulo(k - 2, m) + 1)), point(order(modulo(k, m) + 1)))
+      end do
+      straightest = minloc(off(1:m), 1)
+      if (off(straightest) > near) exit
+      order(straightest:m - 1) = order(straightest + 1:m)
+      m = m - 1
+    end do
+    call keep_only(order(1:m), n, point)
+  end subroutine leave_corners
+
+  !> How far a corner is from the line of two others, across the normal [m].
+  pure real(dp) function distance_from_line(corner, before, after) result(distance)
+    type(patch_point_t), intent(in) :: corner, before, after
+    real(dp) :: u(2), v(2)
+
+    u(:) = after%place(1:2) - before%place(1:2)
+    v(:) = corner%place(1:2) - before%place(1:2)
+    distance = abs(u(1)*v(2) - u(2)*v(1))/max(norm2(u), tiny(distance))
+  end function distance_from_line
+
+  !> Keep some of the points, in their order.
+  pure subroutine keep_only(places, n, point)
+    integer, intent(in) :: places(:)
+    integer, intent(inout) :: n
+    type(patch_point_t), intent(inout) :: point(:)
+    integer :: k, m
+
+    m = 0
+    do k = 1, n
+      if (.not. any(places == k)) cycle
+      m = m + 1
+      point(m) = point(k)
+    end do
+    n = m
+  end subroutine keep_only
+
+  !> Ascending order of a few numbers.
+  pure subroutine argsort_reals(value, order)
+    real(dp), intent(in) :: value(:)
+    integer, intent(out) :: order(:)
+    integer :: k, l
+
+    do k = 1, size(value)
+      l = k
+      do while (l > 1)
+        if (value(order(l - 1)) <= value(k)) exit
+        order(l) = order(l - 1)
+        l = l - 1
+      end do
+      order(l) = k
+    end do
+  end subroutine argsort_reals
 
   !> The manifold of the points: at most `most` of them, in ascending order of their keys.
   pure subroutine fill_manifold(frame, size_of_pair, same_gap, most, n, point, manifold)

@@ -19,8 +19,8 @@ module gravier_convex_distance
     real(dp) :: radius_a = 1.0_dp, radius_b = 1.0_dp
     !> axes of b, one a column, and its centre, in the axes of a and from the centre of a [m]
     real(dp) :: rotation(3, 3) = 0.0_dp, way(3) = 0.0_dp
-    !> Points of a patch that are this near to the line of two others are left out, in parts of the smaller radius; 0: none are.
-    !> Faces that are equal but for what solves have left have four points then, as equal ones have, and not up to eight.
+    !> Corners of a patch that are this near to the line of their neighbours, in parts of the smaller radius, are left out where
+    !> there are more than those of the simpler face; 0: none are. Faces equal but for errors of solves touch as equal ones.
     real(dp) :: straight = 0.0_dp
   end type placed_pair_t
 

@@ -10,7 +10,7 @@ module gravier_polyhedron_pair
   use gravier_core_overlap, only: find_least_separation
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
     & turn_back
-  use gravier_contact_patch, only: patch_point_t, add_point, keep_outline, fill_manifold
+  use gravier_contact_patch, only: patch_point_t, add_point, leave_corners, fill_manifold
   use gravier_edge_patch, only: add_edge_points
   use gravier_face_patch, only: add_face_points
   use gravier_manifold, only: manifold_t, feature_base
@@ -88,7 +88,7 @@ contains
           call add_edge_points(a, b, feature_a, feature_b, frame, n, point)
         else
           call add_face_points(a, b, feature_a, feature_b, frame, n, point)
-          if (pair%straight > 0.0_dp) call keep_outline(pair%straight*scale, n, point)
+          if (pair%straight > 0.0_dp) call leave_corners(pair%straight*scale, min(feature_a%n, feature_b%n), n, point)
         end if
       end if
       exact%gap = found%distance - rounding(1) - rounding(2)

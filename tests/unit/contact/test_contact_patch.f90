@@ -3,7 +3,7 @@ program test_contact_patch
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_contact_feature, only: frame_t
-  use gravier_contact_patch, only: patch_point_t, add_point, fill_manifold
+  use gravier_contact_patch, only: patch_point_t, add_point, leave_corners, fill_manifold
   use gravier_manifold, only: manifold_t, most_points
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -18,10 +18,47 @@ program test_contact_patch
   call test_one_place()
   call test_four()
   call test_many()
+  call test_corners()
   call finish_checks()
   call MPI_Finalize()
 
 contains
+
+  !> The patch of two equal squares, of which one is turned a little: corners, and points at the middle of the sides that stick out.
+  subroutine test_corners()
+    integer :: k
+
+    call make_octagon(1.0e-3_dp)
+    call leave_corners(3.0e-3_dp, 4, n, points)
+    call check_equal(n, 4, "corners of a square")
+    do k = 1, n
+      call check_equal(points(k)%key, 2*k, "in their order")
+    end do
+    call make_octagon(1.0e-3_dp)
+    call leave_corners(3.0e-3_dp, 6, n, points)
+    call check_equal(n, 6, "as many as the simpler face has")
+    call make_octagon(1.0e-2_dp)
+    call leave_corners(3.0e-3_dp, 4, n, points)
+    call check_equal(n, 8, "corners of an octagon")
+    n = 2
+    call leave_corners(3.0e-3_dp, 1, n, points)
+    call check_equal(n, 2, "both ends of an edge")
+  end subroutine test_corners
+
+  !> Corners of a square of half width 1 with even keys, and middles of its sides that are farther out with odd ones.
+  subroutine make_octagon(out)
+    real(dp), intent(in) :: out
+
+    n = 0
+    call add(1.0_dp + out, 0.0_dp, 0.0_dp, 1)
+    call add(1.0_dp, 1.0_dp, 0.0_dp, 2)
+    call add(0.0_dp, 1.0_dp + out, 0.0_dp, 3)
+    call add(-1.0_dp, 1.0_dp, 0.0_dp, 4)
+    call add(-1.0_dp - out, 0.0_dp, 0.0_dp, 5)
+    call add(-1.0_dp, -1.0_dp, 0.0_dp, 6)
+    call add(0.0_dp, -1.0_dp - out, 0.0_dp, 7)
+    call add(1.0_dp, -1.0_dp, 0.0_dp, 8)
+  end subroutine make_octagon
 
   subroutine add(x, y, gap, key)
     real(dp), intent(in) :: x, y, gap
