@@ -168,6 +168,9 @@ contains
             apart = max(apart, seam(2))
           else if (mod(one, feature_base) == mod(other, feature_base)) then
             apart = max(apart, seam(1))
+          else
+            ! a seam of the one over a seam of the other
+            apart = max(apart, minval(seam))
           end if
         end associate
       end do

@@ -105,6 +105,13 @@ contains
       call check_equal(points%key(2, 2), feature_base + 1, "it is that of the first piece")
       call check_close(points%gap(3), -0.04_dp, 0.0_dp, "the other one of the second piece")
     end do
+    points%n = 0
+    call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
+    call points%add(manifold_of([1.2_dp, 2.0_dp], [-0.04_dp, -0.01_dp], [3, 4]), 2, 2)
+    call points%merge_near(1.0e-6_dp, seam)
+    call check_equal(points%n, 4, "a seam beside a body of one piece")
+    call points%merge_near(1.0e-6_dp, [0.3_dp, 0.25_dp])
+    call check_equal(points%n, 3, "a seam over a seam")
   end subroutine check_seam
 
   subroutine test_deepest()
