@@ -323,6 +323,27 @@ class ShapeLaws(RunTestCase):
                 self.assert_status(run, 0)
                 np.testing.assert_allclose([self.track(run, place=k)[-1, 2] for k in (0, 1)], [0.05 - 2 * G / 4e5, 0.15 - 3 * G / 4e5], atol=2e-7)
 
+    def test_stiffness_along_the_ground(self):
+        """A prism of 16 sides and a cube stand on springs and are pulled along the ground by a load that rises slowly, at default settings. Nothing
+        slides: they move by the shear of the springs and by that of rocking on them, along the load alone."""
+        circle = [(0.5 * np.cos(np.pi * k / 8), 0.5 * np.sin(np.pi * k / 8)) for k in range(16)]
+        prism = "hull " + " ".join(f"{x!r} {y!r} {z!r}" for z in (-0.5, 0.5) for x, y in circle)
+        for name, text in (("prism", prism), ("cube", "box 1 1 1")):
+            with self.subTest(name):
+                n, k, weight, pull = 16 if name == "prism" else 4, 1e5, 10.0, 1.0
+                library = f"shape block\nrounding 0.01\n{text}\n"
+                directory = prepare(self.here(f"pulled {name}"), 3, [body("block", [0.0, 0.0, 0.5 - weight / (n * k)], STILL[3], mass=1.0)], library)
+                write(f"{directory}/load.csv", f"time,gx,gy,gz\n0,0,0,{-weight}\n0.1,0,0,{-weight}\n1.1,{pull},0,{-weight}\n2,{pull},0,{-weight}\n")
+                law = {"materials": "m", "kind": "elastic", "friction": 2.0, "normal_stiffness": k, "stiffness_ratio": 0.3, "spring_restitution": 0.1, "tangential_damping": 1.0}
+                run = run_case(shaped_case(3, [{**plane(3), "material": "m"}], {"scene": {"gravity_table": "load.csv"}, "material": [{"name": "m"}], "law": [law],
+                                                                                 "time": {"steps": 1400, "step": 1e-3}, "output": {"every": 1400, "contacts": True}}), 1, directory)
+                self.assert_status(run, 0)
+                along = run.results()["/steps/1400/contacts/point"][:, 0]
+                self.assertEqual(len(along), n)
+                place = self.track(run)[-1]
+                exact = pull / (0.3 * n * k) + 0.25 * pull / (k * ((along - place[0]) ** 2).sum())
+                np.testing.assert_allclose(place[:2] / exact, [1.0, 0.0], atol=2e-3)
+
     def test_edges(self):
         """Blocks on both sides of a segment or a rectangle, across its end, and under its corner, rest or pass; one that lies beyond it falls."""
         for dimension in (2, 3):

@@ -97,14 +97,16 @@ contains
     end associate
   end subroutine recall_elongation
 
-  !> Keep the elongations of the springs of a solved problem with the pairs of the lists; v_global is evaluated. A contact that
-  !> carries nothing forgets.
+  !> Keep the elongations of the springs of a solved problem with the pairs of the lists, as they are at the q_m of the next step;
+  !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its
+  !> velocity and its force: an elongation that fitted the force would move away from the bodies step by step. One that slides has
+  !> the elongation that its force has, and one that carries nothing forgets.
   subroutine conclude_springs(problem, h, halo)
     type(contact_problem_t), intent(in) :: problem
     !> [s]
     real(dp), intent(in) :: h
     type(halo_t), intent(inout) :: halo
-    real(dp), allocatable :: v(:, :, :)
+    real(dp), allocatable :: v(:, :, :), before(:, :)
     real(dp) :: elongation(2), t(3), s(3)
     logical :: slides
     integer :: k, c, d, nd
@@ -112,8 +114,12 @@ contains
     nd = problem%kernels%nd
     do k = 1, size(problem%sub)
       associate (sub => problem%sub(k), list => halo%view(k)%list)
-        call list%forget_elongations()
         allocate (v, mold=sub%impulse)
+        allocate (before(2, sub%n_contacts))
+        do c = 1, sub%n_contacts
+          if (sub%yields(c)) call recall_elongation(list, sub, c, nd, before(:, c))
+        end do
+        call list%forget_elongations()
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
         if (problem%cell%moves) call subtract_images(problem, k, v)
         do c = 1, sub%n_contacts
@@ -121,7 +127,8 @@ contains
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
             slides = uses_its_friction(sub, problem%kernels, c)
             do d = 2, nd
-              elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
+              elongation(d - 1) = before(d - 1, c) + h*v(q, d, g)
+              if (slides) elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
           end associate
           if (nd == 2) then
@@ -131,7 +138,7 @@ contains
             list%spring(:, sub%source(c)) = elongation(1)*t + elongation(2)*s
           end if
         end do
-        deallocate (v)
+        deallocate (v, before)
       end associate
     end do
   end subroutine conclude_springs
@@ -148,13 +155,14 @@ contains
     end associate
   end function uses_its_friction
 
-  !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents;
-  !> v_global is evaluated. At the start elongations along the tangents are not known any more, and count as 0. The spring of a
-  !> contact that slides has the elongation that its force has all the time.
-  subroutine spring_energies(problem, k, physics, energies)
+  !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents,
+  !> once `conclude_springs` was called. At the start elongations along the tangents are not known any more, and count as 0. The
+  !> spring of a contact that slides has the elongation that its force has all the time.
+  subroutine spring_energies(problem, k, halo, physics, energies)
     type(contact_problem_t), intent(in) :: problem
     !> place of the subdomain among those of this rank
     integer, intent(in) :: k
+    type(halo_t), intent(in) :: halo
     type(physics_t), intent(in) :: physics
     !> normal at the start; normal, tangential at the end [J]
     real(dp), intent(out) :: energies(3)
@@ -176,11 +184,12 @@ contains
           energies(2) = energies(2) + own%spring%energy(after, elongation)
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
+          call recall_elongation(halo%view(k)%list, sub, c, nd, elongation)
           do d = 2, nd
             if (slides) then
               elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             else
-              elongation(d - 1) = own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides) - (1.0_dp - theta)*h*v(q, d, g)
+              elongation(d - 1) = elongation(d - 1) - (1.0_dp - theta)*h*v(q, d, g)
             end if
           end do
           energies(3) = energies(3) + own%spring%energy(0.0_dp, elongation)

@@ -165,7 +165,7 @@ contains
       if (step%problem%cell%moves) parts(in_boundary, s) = parts(in_boundary, s) + work_of_carrying(step%halo%view(s), &
         & step%decomposition, s, step%physics%cell)
       if (.not. self%has_springs) cycle
-      call spring_energies(step%problem, s, step%physics, springs)
+      call spring_energies(step%problem, s, step%halo, step%physics, springs)
       parts(in_springs + 1:in_springs + 3, s) = springs
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
