@@ -12,7 +12,7 @@ module gravier_communicator
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_process, only: pause_for, end_at_once
-  use gravier_lone_process, only: ease_start, start_is_over
+  use gravier_lone_process, only: ease_start, start_is_over, n_suggested
   use gravier_exact_sum, only: exact_sum_words, exact_add, exact_value
   implicit none
   private
@@ -66,7 +66,7 @@ contains
 
   !> Start MPI, unless it is running. A process that ends before stop_parallel, by a library that gives up, has status_failure.
   subroutine start_parallel()
-    logical :: running, eased(2)
+    logical :: running, eased(n_suggested)
     integer(c_int) :: ignored
 
     if (.not. parallel) ignored = c_atexit(c_funloc(end_early))

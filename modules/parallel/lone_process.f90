@@ -4,7 +4,7 @@ module gravier_lone_process
   use gravier_process, only: suggest_environment, forget_environment
   implicit none
   private
-  public :: ease_start, start_is_over
+  public :: ease_start, start_is_over, n_suggested
 
   !> Names of which a launcher sets one: of PMIx (mpirun, prterun, srun), of PMI (Hydra, srun, Flux), of mpirun and of Cray's aprun
   !> and PALS.
@@ -13,13 +13,14 @@ module gravier_lone_process
   !> what is suggested: names and values
   character(len=*), parameter :: suggested(2, 2) = reshape([character(len=31) :: &
     & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1"], [2, 2])
+  integer, parameter :: n_suggested = size(suggested, 2)
 
 contains
 
   !> Suggest to Open MPI how it starts a process that is alone; before MPI_Init.
   subroutine ease_start(eased)
     !> which of the suggestions are new, and are to be forgotten
-    logical, intent(out) :: eased(size(suggested, 2))
+    logical, intent(out) :: eased(n_suggested)
     integer :: k, length
 
     eased(:) = .false.
@@ -27,17 +28,18 @@ contains
       call get_environment_variable(trim(launchers(k)), length=length)
       if (length > 0) return
     end do
-    do k = 1, size(eased)
+    do k = 1, n_suggested
       call suggest_environment(trim(suggested(1, k)), trim(suggested(2, k)), eased(k))
     end do
   end subroutine ease_start
 
   !> Forget the suggestions after MPI_Init: programs that this process starts would find them.
   subroutine start_is_over(eased)
-    logical, intent(in) :: eased(:)
+    !> of `ease_start`
+    logical, intent(in) :: eased(n_suggested)
     integer :: k
 
-    do k = 1, size(eased)
+    do k = 1, n_suggested
       if (eased(k)) call forget_environment(trim(suggested(1, k)))
     end do
   end subroutine start_is_over

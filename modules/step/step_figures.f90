@@ -56,8 +56,9 @@ module gravier_step_figures
 
 contains
 
-  !> The velocity up to which the solve may be wrong about what a contact does: what it errs by as a whole, and the most by which a
-  !> contact violates its law. All that is compared with an accuracy is what is not known of these [m/s].
+  !> The velocity up to which the solve may be wrong about what a contact does: the larger of what it errs by as a whole and of the
+  !> most by which a contact violates its law. The velocity scale limits it, because an error that is not known is a huge number
+  !> [m/s].
   pure real(dp) function step_figures_uncertain_velocity(self, of_bonds) result(uncertain)
     class(step_figures_t), intent(in) :: self
     !> what the strength of bonds gives to the mean grain in a step [m/s]

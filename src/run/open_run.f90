@@ -398,13 +398,13 @@ contains
       & trim(merge("half of its thickness", "its radius           ", simulation%effects%shapes))// &
       & " in a step, and may have passed through something: use a smaller &time step", error)
     if (simulation%largest_overlap/worth_a_warning > simulation%overlap_allowed) then
-      text = " m: the solves leave errors that add up"
+      text = "the solves leave errors that add up"
       ! a contact that sends bodies back begins at the first overlap that a step finds
-      if (simulation%effects%restitution) text = " m: bodies that rebound overlap by up to their way in a step before they do, "// &
-        & "and the solves leave errors that add up"
-      text = to_text(simulation%overlap_allowed, 3)//text//"; use a smaller &time step or &solver "//goal_name(simulation)
-      call log%line("warning     overlaps of up to "//to_text(simulation%largest_overlap, 3)// &
-        & " m, far beyond the overlap_allowed of "//text, error)
+      if (simulation%effects%restitution) &
+        & text = "bodies that rebound overlap by up to their way in a step before they do, and "//text
+      call log%line("warning     overlaps of up to "//to_text(simulation%largest_overlap, 3)//" m, far beyond the "// &
+        & "overlap_allowed of "//to_text(simulation%overlap_allowed, 3)//" m: "//text//"; use a smaller &time step or &solver "// &
+        & goal_name(simulation), error)
     end if
     text = "finished    "//verdict_text(simulation)
     if (.not. kept) text = text//"; the last one is not in the results"

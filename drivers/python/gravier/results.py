@@ -348,7 +348,8 @@ class Run:
         return body, contact, arm
 
     def _edges(self, step):
-        """The edges of the period, a row each; those that lean come last first, so that each may be left without changing others' axes."""
+        """The edges of the period, a row each. The last one of a cell that is sheared comes first: it leans along the edges before it, which
+        then bring what is shifted by it back."""
         cell = self.cell(step)
         if cell is not None:
             return cell.edge[::-1]

@@ -77,14 +77,14 @@ contains
     pair%terms%joins = .true.
   end subroutine bonded_evaluate
 
-  !> A bond breaks that is at its limit and gives way, faster than the solve may be wrong.
+  !> A bond at its limit breaks if its bodies part or slide faster than the solve may be wrong.
   pure subroutine bonded_conclude(self, pair)
     class(bonded_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
     logical :: at_limit
 
     if (pair%state /= intact) return
-    ! one without an impulse, under its full tension, is at its limit by this, too
+    ! this holds of a bond under its full tension, too: both impulses are 0
     at_limit = pair%tangential >= (1.0_dp - unused)*self%bond_friction*pair%normal
     if (at_limit .and. pair%motion > pair%uncertain) pair%state = 0
   end subroutine bonded_conclude

@@ -56,7 +56,7 @@ contains
     real(dp), intent(in) :: near
     integer, intent(inout) :: n
     type(patch_point_t), intent(inout) :: point(:)
-    integer :: order(n), chain(2*n), k, l, m, first, kept
+    integer :: order(n), chain(2*n), k, m, first
     real(dp) :: axis(2), along(n), across(n)
 
     if (n < 3) return
@@ -65,16 +65,7 @@ contains
       along(k) = axis(1)*point(k)%place(1) + axis(2)*point(k)%place(2)
       across(k) = axis(1)*point(k)%place(2) - axis(2)*point(k)%place(1)
     end do
-    do k = 1, n
-      kept = k
-      l = k
-      do while (l > 1)
-        if (.not. is_before(kept, order(l - 1))) exit
-        order(l) = order(l - 1)
-        l = l - 1
-      end do
-      order(l) = kept
-    end do
+    call argsort(along, across, order)
     m = 0
     first = 1
     do k = 1, n
@@ -87,13 +78,6 @@ contains
     call keep_only(chain(1:m), n, point)
 
   contains
-
-    pure logical function is_before(a, b)
-      integer, intent(in) :: a, b
-
-      is_before = along(a) < along(b)
-      if (.not. is_before .and. .not. along(b) < along(a)) is_before = across(a) < across(b)
-    end function is_before
 
     !> Go on with the chain to a point, past those that do not stick out to its right.
     pure subroutine extend(next, first, m, chain)
@@ -161,7 +145,8 @@ contains
     do k = 1, n
       angle(k) = atan2(point(k)%place(2) - centre(2), point(k)%place(1) - centre(1))
     end do
-    call argsort_reals(angle, order)
+    off(:) = 0.0_dp
+    call argsort(angle, off, order)
     m = n
     do while (m > max(least, 2))
       do k = 1, m
@@ -201,22 +186,32 @@ contains
     n = m
   end subroutine keep_only
 
-  !> Ascending order of a few numbers.
-  pure subroutine argsort_reals(value, order)
-    real(dp), intent(in) :: value(:)
+  !> Order of a few numbers, ascending; where they are equal that of the second ones, and then their own.
+  pure subroutine argsort(value, second, order)
+    real(dp), intent(in) :: value(:), second(:)
     integer, intent(out) :: order(:)
     integer :: k, l
 
     do k = 1, size(value)
       l = k
       do while (l > 1)
-        if (value(order(l - 1)) <= value(k)) exit
+        if (.not. is_before(k, order(l - 1))) exit
         order(l) = order(l - 1)
         l = l - 1
       end do
       order(l) = k
     end do
-  end subroutine argsort_reals
+
+  contains
+
+    pure logical function is_before(a, b)
+      integer, intent(in) :: a, b
+
+      is_before = value(a) < value(b)
+      if (.not. is_before .and. .not. value(b) < value(a)) is_before = second(a) < second(b)
+    end function is_before
+
+  end subroutine argsort
 
   !> The manifold of the points: at most `most` of them, in ascending order of their keys.
   pure subroutine fill_manifold(frame, size_of_pair, same_gap, most, n, point, manifold)

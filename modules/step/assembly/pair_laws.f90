@@ -174,10 +174,9 @@ contains
     !> place of the subdomain among those of this rank
     integer, intent(in) :: s
     !> (lanes, nc, blocks) [m/s]
-    real(dp), allocatable, intent(inout) :: v(:, :, :)
+    real(dp), allocatable, intent(out) :: v(:, :, :)
     integer :: last
 
-    if (allocated(v)) deallocate (v)
     associate (sub => problem%sub(s), row => problem%kernels%row)
       allocate (v, mold=sub%impulse)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)

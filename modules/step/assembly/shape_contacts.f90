@@ -30,8 +30,8 @@ module gravier_shape_contacts
   !> below which it is level
   real(dp), parameter :: one_place = 1.0e-3_dp, level = 1.0e-3_dp
 
-  !> Of a joint that attracts or yields, corners of the patch say nothing of their own where they are this near to the line of their
-  !> neighbours, over the radius: as many attractions or springs act between two faces that have shifted a little as before.
+  !> Where contacts attract or yield, corners of a patch that are this near to the line of their neighbours, over the radius, are
+  !> left out. Two faces that have shifted a little then have as many attractions or springs as before.
   real(dp), parameter :: straight_joint = 3.0e-3_dp
 
   !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for pieces where bodies are and where they
