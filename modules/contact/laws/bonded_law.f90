@@ -2,7 +2,7 @@
 !> from closing, also where they turn as one (gravier_bond_turning), with tensions up to its strength F and shear
 !> |r_t| <= mu_b (r_n + h F). One that opens or slides in a step is broken for good, and the law is Coulomb's from the next step on.
 !> A bond at its limit whose bodies do not move against each other is intact: others bear what it does not. Which of several bonds
-!> are at their limit is not unique between rigid bodies, whether these move is.
+!> are at their limit is not unique between rigid bodies, so that the motion of the bodies decides.
 module gravier_bonded_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
