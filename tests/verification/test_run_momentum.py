@@ -30,6 +30,11 @@ METHODS = {
 }
 
 
+#: from this coefficient of friction on the iterates of packings wander, plain and with momentum: their error goes on crossing 0.1 g h
+#: for thousands of iterations, so that the last time it is above says nothing
+WANDERING = 0.8
+
+
 def below_for_good(trace):
     """Iterations from which on the estimated velocity error was at most each of GOALS, None where it was above at the end."""
     found = []
@@ -38,6 +43,12 @@ def below_for_good(trace):
         after = above[-1] + 1 if len(above) else 0
         found.append(int(trace["iteration"][after]) if after < len(trace["iteration"]) else None)
     return found
+
+
+def below_first(trace):
+    """Iterations at which the estimated velocity error was at most each of GOALS for the first time, where a run to this accuracy ends."""
+    below = [np.nonzero(trace["velocity_error"] <= goal * 9.81 * STEP)[0] for goal in GOALS]
+    return [int(trace["iteration"][found[0]]) if len(found) else None for found in below]
 
 
 class Momentum(RunTestCase):
@@ -73,13 +84,15 @@ class Momentum(RunTestCase):
             for plain in (True, False):
                 # 3: the tolerance was not met, which is no failure of a comparison
                 self.assertIn(runs[title, plain].status, (0, 3), runs[title, plain])
-            found[title] = tuple(below_for_good(runs[title, plain].trace()) for plain in (True, False))
+            wanders = cases[title]["scene"]["friction"] >= WANDERING
+            found[title] = tuple((below_first if wanders else below_for_good)(runs[title, plain].trace()) for plain in (True, False))
             print(f"  {title:30s} {found[title][0]}\n  {'':21s} momentum {found[title][1]}")
         return found
 
     def test_never_much_slower(self):
-        """To every velocity error that plain iterations reach, momentum takes at most a tenth more and one check. At a friction of 0.8 and
-        more spheres take thousands of plain iterations, in `./gravier test long`."""
+        """To every velocity error that plain iterations reach, momentum takes at most a tenth more and one check. Where the iterates settle,
+        it stays below this error from then on. At a friction of 0.8 and more spheres take thousands of plain iterations, in
+        `./gravier test long`."""
         cases = {f"column, {name}": merged(self.column, method) for name, method in METHODS.items() if name != "nscdd_ep"}
         for name, method in METHODS.items():
             cases[f"disks 0.3, {name}"] = merged(self.disks, method)
