@@ -72,6 +72,28 @@ class Impacts(ComplianceScene):
         self.verify("impact on a spring, theta = 1", "restitution, h omega = pi/160", found[-1], np.exp(-np.pi**2 / 320), 2e-4)
         self.assertGreater(rate(found - np.exp(-np.pi**2 / 2 / np.array([80, 160]))), 1.8)
 
+    def test_oblique_impact(self):
+        """A ball whose springs swing at the same frequency along both directions sticks all through its impact. Its velocity follows
+        that of the spring from where it touches in a step, and that of its contact comes back reversed: of the second order."""
+        speed = 0.5
+        for dimension, lead in itertools.product((2, 3), (0.0, 0.3, 0.8)):
+            share = 1 / 3 if dimension == 2 else 2 / 7
+            law = elastic(normal_stiffness=STIFFNESS, stiffness_ratio=share, friction=1.0, spring_theta=0.5)
+            with self.subTest(dimension=dimension, lead=lead):
+                errors = []
+                for count in (20, 40, 80):
+                    self.step = np.pi / FREQUENCY / count
+                    n = up(dimension)
+                    ball = Grain((RADIUS + lead * self.step) * n, speed * np.eye(dimension)[0] - n, radius=RADIUS, mass=MASS)
+                    record = self.play(f"oblique {dimension} {lead} {count}", [ball], [plane(0 * n, n, material="m")], steps=2 * count,
+                                       material=MATERIAL, law=[law], output={"every": count // 2})
+                    phase = FREQUENCY * (record.time[[1, -1]] - lead * self.step)
+                    exact = 1 - share * (1 - np.cos(np.minimum(phase, np.pi)))
+                    errors.append(record.velocity[[1, -1], 0, 0] / speed - exact)
+                for part, when in zip(np.transpose(errors), ("at the largest compression", "rebound")):
+                    self.assertGreater(rate(part), 1.8)
+                    self.verify("oblique impact on springs", f"velocity {when}, h omega = pi/80, {dimension}D", part[-1], 0, 1e-4)
+
     def test_restitution(self):
         """The dashpot returns the restitution asked for, of a ball on a plane and of two, whatever their speed: second order."""
         for wanted, pair, speed in ((0.8, False, 1.0), (0.5, True, 1.0), (0.5, False, 0.01), (0.1, False, 1.0)):
@@ -333,8 +355,8 @@ class Tangential(ComplianceScene):
             x = np.concatenate([[0], np.cumsum(0.5 * self.step * (v[:-1] + v[1:]))])
             middle = x[:-1] + 0.5 * self.step * v[:-1]
             at = middle - (1 - theta)**2 * self.step * v[:-1] + theta**2 * self.step * v[1:]
-            # the spring begins at the middle of the first step
-            force, kept = [], 0.0
+            # the spring begins at the start of the first step
+            force, kept = [], middle[0]
             for k, here in enumerate(at):
                 elongation = np.clip(kept + here - middle[k], -yields, yields)
                 force.append(ratio * STIFFNESS * elongation)

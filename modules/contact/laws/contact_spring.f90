@@ -7,6 +7,9 @@
 !> phi = 1 damps what the step does not resolve, and tends to the rigid law v + g/h >= 0 as k grows. Solved for v this is
 !>   v + s + a r = 0,   a = 1/(h A),   s = (k x_m + (c (1 - phi) - k (1 - phi)^2 h) v_i)/A,   A = k phi^2 h + c phi,
 !> the law of a contact with the compliance a [1/kg] and the shift s [m/s].
+!>
+!> Bodies that meet during a step do so where their gap closes. Along the normal the gap at q_m says where this is. The tangential
+!> springs begin there, too: their x_m is the way of the contact from there to the middle of the step.
 module gravier_contact_spring
   use gravier_kinds, only: dp
   implicit none
@@ -35,7 +38,10 @@ module gravier_contact_spring
     real(dp) :: dashpot(2) = 0.0_dp
     !> of the contact at the start of the step: along the normal, then along the tangents [m/s]
     real(dp) :: velocity(3) = 0.0_dp
+    !> x_m along the tangents [m]
+    real(dp) :: stretch(2) = 0.0_dp
   contains
+    procedure :: stretches => spring_step_stretches
     procedure :: damp => spring_step_damp
     procedure :: law => spring_step_law
     procedure :: carried => spring_step_carried
@@ -73,6 +79,27 @@ contains
     end if
     energy = energy + 0.5_dp*self%stiffness(2)*sum(elongation**2)
   end function spring_energy
+
+  !> Set the elongations at q_m of a contact that has kept `kept` of them. A contact that has kept none has none where its bodies touch,
+  !> if its velocities bring them together in this step or did so after the q_m of the last one, in which they pressed nothing then.
+  !> Otherwise it has none at the start of the step.
+  pure subroutine spring_step_stretches(self, kept, h, theta, gap)
+    class(spring_step_t), intent(inout) :: self
+    !> along the tangents [m]
+    real(dp), intent(in) :: kept(2)
+    !> [s]; q_m is (1 - theta) h from the start of the step; at q_m [m]
+    real(dp), intent(in) :: h, theta, gap
+    real(dp) :: since
+
+    self%stretch(:) = kept
+    if (maxval(abs(kept)) > 0.0_dp) return
+    associate (v => self%velocity)
+      since = merge(0.0_dp, (1.0_dp - theta)*h, gap > 0.0_dp)
+      ! times are compared as ways, so that nothing is divided by a small velocity
+      if (v(1) < 0.0_dp .and. gap > h*v(1) .and. gap < -theta*h*v(1)) since = gap/v(1)
+      self%stretch(:) = since*v(2:3)
+    end associate
+  end subroutine spring_step_stretches
 
   !> Set the dashpots of a contact whose normal local operator W_nn stands for a mass 1/W_nn. They act while the bodies touch: in a
   !> step in which these meet or part, for the part of it in which the velocity of its start has them overlap.

@@ -340,7 +340,7 @@ contains
         end if
         if (row%shift_t == 0) cycle
         sub%hot(q, row%shift_t:row%shift_t + nd - 2, g) = terms%tangential_restitution*v(q, 2:nd, g)
-        if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics%h, c, v(q, 1:nd, g), sub)
+        if (size(found%spring) > 0) call pack_spring(view%list, found%spring(this%f), kernels, physics, c, v(q, 1:nd, g), sub)
       end associate
     end do
   end subroutine pack_returned

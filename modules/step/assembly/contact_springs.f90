@@ -20,20 +20,19 @@ contains
 
   !> Give contact `c` its springs: shifts and compliances. The contact is packed but for these and for its local operator; a rigid
   !> contact comes back as it was, without compliance.
-  subroutine pack_spring(list, spring, kernels, h, c, velocity, sub)
+  subroutine pack_spring(list, spring, kernels, physics, c, velocity, sub)
     type(neighbour_list_t), intent(in) :: list
     type(spring_t), intent(in) :: spring
     type(kernels_t), intent(in) :: kernels
-    !> [s]
-    real(dp), intent(in) :: h
+    type(physics_t), intent(in) :: physics
     integer, intent(in) :: c
     !> of the contact at the start of the step (nd) [m/s]
     real(dp), intent(in) :: velocity(:)
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: w(2), law(2), elongation(2)
+    real(dp) :: w(2), law(2), kept(2)
     integer :: d
 
-    associate (q => lane_of(c), g => block_of(c), row => kernels%row, own => sub%spring(c))
+    associate (q => lane_of(c), g => block_of(c), row => kernels%row, own => sub%spring(c), h => physics%h)
       sub%hot(q, row%compliance_n:row%compliance_t, g) = 0.0_dp
       own%spring = spring
       if (.not. spring%yields()) return
@@ -44,9 +43,10 @@ contains
       law(:) = own%law(1, h, sub%gap(c))
       sub%hot(q, row%compliance_n, g) = law(1)
       sub%hot(q, row%shift, g) = law(2)
-      call recall_elongation(list, sub, c, kernels%nd, elongation)
+      kept(:) = kept_elongation(list, sub, c, kernels%nd)
+      call own%stretches(kept, h, physics%theta, sub%gap(c))
       do d = 2, kernels%nd
-        law(:) = own%law(d, h, elongation(d - 1))
+        law(:) = own%law(d, h, own%stretch(d - 1))
         sub%hot(q, row%compliance_t, g) = law(1)
         sub%hot(q, row%shift_t + d - 2, g) = law(2)
       end do
@@ -74,12 +74,12 @@ contains
 
   !> Elongation of the tangential spring of contact `c` in its frame [m]. In space the vector that is kept is brought into the
   !> tangent plane of now, its length unchanged.
-  pure subroutine recall_elongation(list, sub, c, nd, elongation)
+  pure function kept_elongation(list, sub, c, nd) result(elongation)
     type(neighbour_list_t), intent(in) :: list
     type(subproblem_t), intent(in) :: sub
     integer, intent(in) :: c, nd
     !> along t and s; 0 along s in the plane
-    real(dp), intent(out) :: elongation(2)
+    real(dp) :: elongation(2)
     real(dp) :: t(3), s(3), length
 
     elongation(:) = 0.0_dp
@@ -95,7 +95,7 @@ contains
         if (norm2(elongation) > 0.0_dp) elongation(:) = elongation*(length/norm2(elongation))
       end if
     end associate
-  end subroutine recall_elongation
+  end function kept_elongation
 
   !> Keep the elongations of the springs of a solved problem with the pairs of the lists, as they are at the q_m of the next step;
   !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its
@@ -106,7 +106,7 @@ contains
     !> [s]
     real(dp), intent(in) :: h
     type(halo_t), intent(inout) :: halo
-    real(dp), allocatable :: v(:, :, :), before(:, :)
+    real(dp), allocatable :: v(:, :, :)
     real(dp) :: elongation(2), t(3), s(3)
     logical :: slides
     integer :: k, c, d, nd
@@ -115,20 +115,16 @@ contains
     do k = 1, size(problem%sub)
       associate (sub => problem%sub(k), list => halo%view(k)%list)
         allocate (v, mold=sub%impulse)
-        allocate (before(2, sub%n_contacts))
-        do c = 1, sub%n_contacts
-          if (sub%yields(c)) call recall_elongation(list, sub, c, nd, before(:, c))
-        end do
         call list%forget_elongations()
         call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
         if (problem%cell%moves) call subtract_images(problem, k, v)
         do c = 1, sub%n_contacts
-          associate (q => lane_of(c), g => block_of(c))
+          associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
             slides = uses_its_friction(sub, problem%kernels, c)
             do d = 2, nd
-              elongation(d - 1) = before(d - 1, c) + h*v(q, d, g)
-              if (slides) elongation(d - 1) = sub%spring(c)%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
+              elongation(d - 1) = own%stretch(d - 1) + h*v(q, d, g)
+              if (slides) elongation(d - 1) = own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
           end associate
           if (nd == 2) then
@@ -138,7 +134,7 @@ contains
             list%spring(:, sub%source(c)) = elongation(1)*t + elongation(2)*s
           end if
         end do
-        deallocate (v, before)
+        deallocate (v)
       end associate
     end do
   end subroutine conclude_springs
@@ -184,7 +180,7 @@ contains
           energies(2) = energies(2) + own%spring%energy(after, elongation)
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
-          call recall_elongation(halo%view(k)%list, sub, c, nd, elongation)
+          elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
           do d = 2, nd
             if (slides) then
               elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)

@@ -11,6 +11,7 @@ program test_contact_spring
   call test_law_of_a_step()
   call test_elongation()
   call test_dashpot()
+  call test_stretches()
   call test_energy()
   call test_rebound()
   call finish_checks()
@@ -99,6 +100,31 @@ contains
     step%spring%stiffness(:) = 0.0_dp
     call check(.not. step%spring%yields(), "without stiffness a contact is rigid")
   end subroutine test_dashpot
+
+  !> Elongations at q_m of a contact that may have kept none; h = 0.2 s, theta = 0.75: q_m is 0.05 s after the start of the step.
+  subroutine test_stretches()
+    type(spring_step_t) :: step
+
+    step%velocity(:) = [-2.0_dp, 3.0_dp, -1.0_dp]
+    call stretch_is(step, [0.4_dp, 0.3_dp], -0.08_dp, [0.4_dp, 0.3_dp], "what was kept stays")
+    call stretch_is(step, [0.0_dp, 0.0_dp], -0.08_dp, [0.12_dp, -0.04_dp], "bodies that met before q_m")
+    call stretch_is(step, [0.0_dp, 0.0_dp], 0.2_dp, [-0.3_dp, 0.1_dp], "bodies that meet after q_m")
+    call stretch_is(step, [0.0_dp, 0.0_dp], 0.32_dp, [0.0_dp, 0.0_dp], "bodies that do not meet in this step")
+    call stretch_is(step, [0.0_dp, 0.0_dp], -0.38_dp, [0.57_dp, -0.19_dp], "bodies that met in the last step")
+    call stretch_is(step, [0.0_dp, 0.0_dp], -0.42_dp, [0.15_dp, -0.05_dp], "bodies that met before")
+    step%velocity(1) = 0.0_dp
+    call stretch_is(step, [0.0_dp, 0.0_dp], -0.1_dp, [0.15_dp, -0.05_dp], "bodies that keep their distance")
+    call stretch_is(step, [0.0_dp, 0.0_dp], 0.1_dp, [0.0_dp, 0.0_dp], "bodies that stay apart")
+  end subroutine test_stretches
+
+  subroutine stretch_is(step, kept, gap, stretch, what)
+    type(spring_step_t), intent(inout) :: step
+    real(dp), intent(in) :: kept(2), gap, stretch(2)
+    character(len=*), intent(in) :: what
+
+    call step%stretches(kept, 0.2_dp, 0.75_dp, gap)
+    call check_close(maxval(abs(step%stretch - stretch)), 0.0_dp, rounding, what)
+  end subroutine stretch_is
 
   subroutine test_energy()
     type(spring_t) :: spring
