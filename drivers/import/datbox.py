@@ -3,7 +3,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from datbox_text import ABOVE_0, Refused, entries, number
+from datbox_text import ABOVE_0, Refused, entries
 
 
 GRAINS = {"DISKx": 2, "DISKb": 2, "SPHER": 3, "SPHEb": 3}
@@ -127,7 +127,7 @@ def read_laws(path):
         elif keyword == "$seety" and len(entry.words) >= 7 and entry.words[0] != "cdbdy":
             _, candidate, colour, law, _, antagonist, other = entry.words[:7]
             # the distance stands alone, or as alert= on the same line or on the next
-            alert = number(entry.words[7]) if len(entry.words) > 7 and entry.words[7] != "alert" else entry.get("alert")
+            alert = entry.number(entry.words[7]) if len(entry.words) > 7 and entry.words[7] != "alert" else entry.get("alert")
             entry.check("alert", alert)
             sees.append(({(candidate, colour), (antagonist, other)}, law, alert, entry))
     if not sees:
@@ -197,8 +197,8 @@ def read_contacts(path, bodies, laws):
             law = laws.get(words[kinds[1] - 1])
             if law and law.words[1] == "IQS_MOHR_DS_CLB" and not status.startswith("M"):
                 entry.refuse(f"bodies {pair[0]} and {pair[1]} with status {status}, whose bond is broken", "Mstck: near pairs begin bonded here")
-            along = [entry.values.get(f"{name}/H", 0.0) for name in ("rln", "rlt", "rls")]
-            normal = entry.vector("n", 3, 0.0)
+            along = [entry.get(f"{name}/H", 0.0 if name == "rls" and bodies[0].dimension == 2 else None) for name in ("rln", "rlt", "rls")]
+            normal = np.append(entry.vector("n", bodies[0].dimension), [0.0] * (3 - bodies[0].dimension))
             if bodies[0].dimension == 2:
                 tangents = np.array([[normal[1], -normal[0], 0.0], [0.0] * 3])
             else:

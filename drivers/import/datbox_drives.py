@@ -2,7 +2,7 @@
 import math
 
 import numpy as np
-from datbox_text import Refused, entries, number
+from datbox_text import Refused, entries
 
 
 #: rows to a period of a drive that oscillates
@@ -10,10 +10,10 @@ ROWS_PER_PERIOD = 200
 
 
 class Function:
-    """A driven value against time: constant, or its table of (time, value)."""
+    """A driven value against time: constant, or its table of (time, value). A formula is a table up to the time `until` alone."""
 
-    def __init__(self, constant=0.0, table=None):
-        self.constant, self.table = constant, table
+    def __init__(self, constant=0.0, table=None, until=None):
+        self.constant, self.table, self.until = constant, table, until
 
     @staticmethod
     def of(entry, start, end):
@@ -24,8 +24,12 @@ class Function:
                 table = np.loadtxt(path, ndmin=2)
             except (OSError, ValueError) as problem:
                 raise Refused(f"{entry.path}: line {entry.line}: {path}: {problem}: expected a file of times and values") from None
+            if table.shape[1] < 2 or not np.all(np.isfinite(table[:, :2])) or np.any(np.diff(table[:, 0]) <= 0.0):
+                entry.refuse(f"{path}", "two columns of finite numbers, times that rise and values")
             return Function(table=table[:, :2] - [start, 0.0])
-        ct, amp, omega, phi, rampi, ramp = (number(word) for word in entry.words[2:8])
+        if len(entry.words) < 8:
+            entry.refuse(f"{' '.join(entry.words)}", "six numbers: CT, AMP, OMEGA, PHI, RAMPI and RAMP")
+        ct, amp, omega, phi, rampi, ramp = (entry.number(word) for word in entry.words[2:8])
         if (amp == 0.0 or omega == 0.0) and ramp == 0.0:
             return Function((ct + amp * math.cos(phi)) * min(1.0, rampi))
         times = [0.0, end - start]
@@ -35,7 +39,7 @@ class Function:
             times += list(np.arange(0.0, end - start, 2.0 * math.pi / abs(omega) / ROWS_PER_PERIOD))
         times = np.unique(times)
         values = (ct + amp * np.cos(omega * (times + start) + phi)) * np.minimum(1.0, rampi + ramp * (times + start))
-        return Function(table=np.stack([times, values], axis=1))
+        return Function(table=np.stack([times, values], axis=1), until=end - start)
 
     def same(self, other):
         return self.constant == other.constant and np.array_equal(*([] if one.table is None else one.table for one in (self, other)))

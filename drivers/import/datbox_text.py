@@ -11,8 +11,10 @@ ABOVE_0 = sys.float_info.min
 #: other names of parameters of laws, as LMGC90 itself writes them, in full or in four letters, and those of its pre-processor
 OLDER = {"dfric": "dyfr", "dfrc": "dyfr", "sfric": "stfr", "sfrc": "stfr", "cohen": "cohn", "cohet": "coht", "Wethk": "Wthk", "Weth": "Wthk",
          "restn": "rstn", "restt": "rstt"}
-#: `name= number`; forces and gaps of contacts stand without the sign
-VALUE = re.compile(r"(?:([A-Za-z]\w*(?:\(\d\))?)\s*=|\b(rl[nts]/H|gapTT))\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[DdEe][-+]?\d+|[-+]\d{3})?)")
+#: `name= number`; forces and gaps of contacts stand without the sign. What begins as a number has to be one up to the next blank
+VALUE = re.compile(r"(?:([A-Za-z]\w*(?:\(\d\))?)\s*=|\b(rl[nts]/H|gapTT))\s*([-+]?\.?\d[^\s=]*)")
+#: as Fortran writes it
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[DdEe][-+]?\d+|[-+]\d{3})?")
 
 
 class Refused(Exception):
@@ -34,9 +36,15 @@ class Entry:
 
     def add(self, text):
         # ax1 is the older name of axe1
-        self.rows.append({OLDER.get(name, re.sub(r"^ax(?=\d$)", "axe", name or bare)): number(value)
+        self.rows.append({OLDER.get(name, re.sub(r"^ax(?=\d$)", "axe", name or bare)): self.number(value, f"{name}= " if name else f"{bare} ")
                           for name, bare, value in VALUE.findall(text)})
         self.values.update(self.rows[-1])
+
+    def number(self, text, name=""):
+        """A word that is a number."""
+        if not NUMBER.fullmatch(text):
+            self.refuse(f"{name}{text}", "a number")
+        return number(text)
 
     def size(self, place, name):
         """A size of a contactor: LMGC90 reads it by its place on the first line, whatever its name."""

@@ -15,6 +15,9 @@ def motion(case, body, whole):
     mass = case.bulks.mass_of(body)
     for k, name in enumerate(names):
         kind, function, entry = body.drives.get(k + 1, ("force", Function(), body.start))
+        if function.until is not None:
+            case.remarks.append(f"formulas of drives are written up to the last step, {function.until:g} s, and constant afterwards: import with "
+                                "more --steps for a longer run")
         if kind == "vlocy":
             if function.table is None:
                 velocity[k] = function.constant
@@ -29,6 +32,7 @@ def motion(case, body, whole):
         # what moves freely bears its weight, which a boundary here does not
         weight = mass * case.gravity[k]
         free[k] = True
+        velocity[k] = float(body.velocity()[k])
         if function.table is None:
             force[k] = function.constant + weight
         else:

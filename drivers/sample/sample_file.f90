@@ -4,7 +4,6 @@ module gravier_sample_file
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: reset_timers
-  use gravier_file_system, only: make_directory
   use gravier_own_files, only: check_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_bodies_file, only: bodies_data_t, write_bodies
@@ -15,7 +14,8 @@ module gravier_sample_file
   use gravier_run_log, only: run_log_t
   use gravier_run_memory, only: check_written_sample
   use gravier_sample_bodies, only: make_sample
-  use gravier_sample_preparation, only: prepare_sample, open_log
+  use gravier_sample_place, only: sample_program, check_place, open_log
+  use gravier_sample_preparation, only: prepare_sample
   implicit none
   private
   public :: write_sample
@@ -46,7 +46,7 @@ contains
     ! what enters while a run goes on is no part of a sample, and nobody reads means
     deallocate (config%insertions, config%regions)
     allocate (config%insertions(0), config%regions(0))
-    call prepare_directory(comm, config, error)
+    call check_place(comm, config, error)
     call lock%take_file(comm, trim(config%sample%file), "gravier_sample "//path, error)
     if (.not. allocated(error)) then
       if (config%sample%preparation == "none") then
@@ -75,6 +75,7 @@ contains
     if (allocated(error)) return
     call make_sample(comm, config, shapes, data, error)
     if (allocated(error)) return
+    data%made_by = sample_program
     call open_log(config, log, error)
     call write_bodies(comm, trim(config%sample%file), data, error, shapes)
     call check_own_files(error)
@@ -82,23 +83,5 @@ contains
     if (.not. allocated(error)) call log%line("finished    "//to_text(data%total)//" grains, "//to_text(data%n_walls)// &
       & " planes; written to "//trim(config%sample%file), error)
   end subroutine write_unprepared
-
-  !> Make the directory of the bodies file, or say why it cannot be used. Collective.
-  subroutine prepare_directory(comm, config, error)
-    type(communicator_t), intent(in) :: comm
-    type(config_t), intent(in) :: config
-    type(error_t), allocatable, intent(inout) :: error
-    type(error_t), allocatable :: reason
-    character(len=:), allocatable :: directory
-
-    if (comm%rank == 0) then
-      directory = config%sample%file(1:index(config%sample%file, "/", back=.true.))
-      if (directory == "") directory = "."
-      call make_directory(directory, reason)
-      if (allocated(reason)) call raise(error, status_input, config%file//": &sample file = '"//trim(config%sample%file)// &
-        & "': expected a file in a directory that can be written to: "//reason%message)
-    end if
-    call comm%agree(error)
-  end subroutine prepare_directory
 
 end module gravier_sample_file

@@ -12,12 +12,13 @@ module gravier_sample_preparation
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
+  use gravier_sample_place, only: sample_program, open_log
   use gravier_sample_rest, only: rest_t
   use gravier_own_files, only: check_own_files
   use gravier_final_bodies, only: write_final_bodies
   implicit none
   private
-  public :: prepare_sample, open_log
+  public :: prepare_sample
 
   !> steps from one line of the log to the next
   integer, parameter :: steps_a_line = 100
@@ -65,7 +66,7 @@ contains
     if (.not. allocated(error)) call write_summary(simulation, log, rest, error)
     if (keep) then
       if (rest%reached()) call stop_grains(simulation)
-      call write_final_bodies(simulation, trim(config%sample%file), .true., error)
+      call write_final_bodies(simulation, trim(config%sample%file), .true., sample_program, error)
     end if
     call check_own_files(error)
     call comm%agree(error)
@@ -74,18 +75,6 @@ contains
     call comm%agree(error)
     call simulation%free()
   end subroutine prepare_sample
-
-  !> Open the log that goes with the bodies file: its name with the ending .log. Collective.
-  subroutine open_log(config, log, error)
-    type(config_t), intent(in) :: config
-    type(run_log_t), intent(inout) :: log
-    type(error_t), allocatable, intent(inout) :: error
-
-    associate (file => config%sample%file)
-      call log%open(file(1:index(file, ".", back=.true.))//"log", .false., error)
-    end associate
-    call log%comm%agree(error)
-  end subroutine open_log
 
   !> Let forces move the upper plane across each axis that is not periodic. Collective.
   subroutine free_planes(simulation)

@@ -145,7 +145,8 @@ module gravier_config_table
            "path of the facets of a mesh: an STL or OBJ file of triangles or polygons in 3D, an OBJ file of lines or a CSV "// &
            "file of the points `x,y` of one line in 2D; see [mesh walls](user_guide.md#mesh-walls)", &
            note="required", chooser="shape", chosen=faceted_shapes), &
-     key_t("boundary", "velocity", kind_real, "3*0", "", "prescribed velocity; its third component is 0 in 2D", &
+     key_t("boundary", "velocity", kind_real, "3*0", "", &
+           "prescribed velocity, of `free` components that at the start; its third component is 0 in 2D", &
            count=3, unit="m/s"), &
      key_t("boundary", "rotation", kind_real, "3*0", "", &
            "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &

@@ -59,17 +59,19 @@ contains
 
     associate (unused => figures, unused_seconds => seconds)
     end associate
-    call write_final_bodies(simulation, self%path, simulation%config%output%final_forces, error)
+    call write_final_bodies(simulation, self%path, simulation%config%output%final_forces, "gravier", error)
   end subroutine final_bodies_write
 
   !> Write grains with their shapes, the walls that came with them, the period and, on request, the contacts that press, with
   !> their forces. Boundaries of the input file are not written: the next input file has its own. Contacts name them. Collective;
   !> errors are the same on all ranks.
-  subroutine write_final_bodies(simulation, path, with_forces, error)
+  subroutine write_final_bodies(simulation, path, with_forces, made_by, error)
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: path
     !> those of the last step, where this run has made one
     logical, intent(in) :: with_forces
+    !> the program
+    character(len=*), intent(in) :: made_by
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
     integer :: s, k, n, nd, nv, w
@@ -83,6 +85,7 @@ contains
       call allocate_walls(data, nd, simulation%n_walls, path, error)
       call simulation%comm%agree(error)
       if (allocated(error)) return
+      data%made_by = made_by
       data%total = simulation%n_grains
       n = 0
       do s = 1, size(decomposition%owned)

@@ -205,7 +205,11 @@ contains
     boundary%group = config%group
     ! the values were checked
     call set_surface(config, boundary%surface, wrong, expected)
-    boundary%given_velocity(:) = config%velocity
+    where (config%free)
+      boundary%velocity = config%velocity
+    elsewhere
+      boundary%given_velocity = config%velocity
+    end where
     boundary%given_spin(:) = config%rotation
     if (nd == 2) then
       boundary%given_spin(3) = config%rotation(1)

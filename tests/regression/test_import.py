@@ -246,6 +246,36 @@ class Import(RunTestCase):
             weight = 2500.0 * math.pi * 0.05**2 * G
             self.assertLess(abs(forces[-1][0, 1] + 30.0 + 2.0 * G + weight), 0.01 * weight)
 
+    def test_a_lid_that_falls(self):
+        """A lid that forces move starts with its velocity of DOF.INI: it falls freely."""
+        bodies = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
+            body(2, 2, [0.0, 1.0], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))], avrd=0.1)
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        lid = drive(2, 2, [("vlocy", 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), ("vlocy", 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])
+        folder, _ = self.convert(self.box(2, bodies, laws, lid, state(2, 1, [0.0, 0.0], [0.0, 0.0]) + state(2, 2, [0.0, 0.0], [0.0, 0.3])))
+        self.run_case(folder)
+        with h5py.File(os.path.join(folder, "case_results", "results.h5")) as file:
+            first, last = (file[f"steps/{k}/boundaries/velocity"][0, 1] for k in (0, max(map(int, file["steps"]))))
+        self.assertEqual(first, 0.3)
+        self.assertAlmostEqual(last, 0.3 - 50e-3 * G, places=12)
+
+    def test_drives_of_a_file(self):
+        """A file of a drive has times that rise."""
+        bodies = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + \
+            body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        drives = still(2, 2).replace(" vlocy      1 " + " ".join(map(real, (0.0, 0.0, 0.0, 0.0, 1.0, 0.0))), " vlocy      1 evolution way.txt")
+        for rows, status in (("0 2\n0.05 7\n0.1 1\n", 0), ("0 2\n0.1 1\n0.05 7\n", 2), ("0\n1\n", 2), ("0 2\n0.1 nan\n", 2)):
+            with self.subTest(rows=rows):
+                box = self.box(2, bodies, laws, drives)
+                write(os.path.join(box, "way.txt"), rows)
+                folder, message = self.convert(box, status=status)
+                if status == 0:
+                    table = np.loadtxt(os.path.join(folder, "case_drive_1.csv"), delimiter=",", skiprows=2)
+                    np.testing.assert_array_equal(table[:, :2], [[0.0, 2.0], [0.05, 7.0], [0.1, 1.0]])
+                else:
+                    self.assertIn("way.txt: expected two columns of finite numbers, times that rise and values", message)
+
     def test_laws_by_wall(self):
         """A wall has its own law: RST_CLB on the ground, IQS_CLB between disks."""
         disk = body(2, 1, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))])
@@ -555,6 +585,20 @@ class Import(RunTestCase):
         self.assertTrue(row.startswith("1,SPHER,2,SPHER,slide,-1e-06,10.0,-0.5,3.0,0.6,0.0,0.8,"), row)
         np.testing.assert_allclose([float(cell) for cell in row.split(",")[-3:]], [6.0 - 0.4, 3.0, 8.0 + 0.3], rtol=1e-12)
 
+    def test_forces_that_cannot_be_read(self):
+        """A contact without a normal force or a normal, or with one that is no number, is refused: it is no contact without force."""
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx")
+        bodies = "".join(body(2, k, [0.1 * k, 0.0], [("DISKx", "BLUEx", values(byrd=0.05))]) for k in (1, 2))
+        lines = [{"rlt/H": 0.0, "rln/H": 1.0, "rls/H": 0.0}, {"n(1)=": -1.0, "n(2)=": 0.0, "n(3)=": 0.0}]
+        good = self.contact("DKDKx", "iqsc0", "stick", lines)
+        self.convert(self.box(2, bodies, laws, contacts=good))
+        for change, name in (((f"rln/H{real(1.0)}", "rln/H NaN"), "rln/H"), ((f"rln/H{real(1.0)}", ""), "rln/H"), (("n(2)=", "m(2)="), "n2")):
+            with self.subTest(change=change):
+                self.assertIn(change[0], good)
+                folder, message = self.convert(self.box(2, bodies, laws, contacts=good.replace(*change)), status=2)
+                self.assertIn(f"Vloc_Rloc.INI: line 5: {name}= is missing: expected a value", message)
+                self.assertEqual(os.listdir(folder), [])
+
     def test_a_broken_bond_is_refused(self):
         """LMGC90 bonds at its first step what it does not know; a contact that Vloc_Rloc.INI has, it takes as it is."""
         laws = self.law("cohes", "IQS_MOHR_DS_CLB", {"cohn": 10.0, "coht": 5.0}, {"dyfr": 0.3, "stfr": 0.3}) + self.see("cohes")
@@ -711,6 +755,13 @@ class Import(RunTestCase):
             ({"contacts": "$icdan  DKDKx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      9  DISKx      1\n"},
              ("Vloc_Rloc.INI: line 3", "bodies 1 and 9")),
             ({"bodies": "nothing\n"}, ("no body", "$bdyty")),
+            # what begins as a number is one
+            ({"laws": laws.replace("0.3000000D+00", "0.3000O00D-01")}, ("TACT_BEHAV.DAT: line 2: fric= 0.3000O00D-01: expected a number",)),
+            ({"bulk": bulk.replace("grv2=", "grv2=-9,81 grv3=")}, ("BULK_BEHAV.DAT: line 2: grv2= -9,81: expected a number",)),
+            ({"bulk": bulk.replace("0.2500000D+04", "0.25O0000D+04")}, ("BULK_BEHAV.DAT: line 6: Umas= 0.25O0000D+04: expected a number",)),
+            ({"laws": laws.replace("0.2000000D-02", "0.20O0000D-02", 1)}, ("TACT_BEHAV.DAT: line 5: 0.20O0000D-02: expected a number",)),
+            ({"drives": still(2, 2).replace("0.1000000D+01", "0.1O00000D+01", 1)}, ("DRV_DOF.DAT: line 7: 0.1O00000D+01: expected a number",)),
+            ({"drives": still(2, 2).replace(" 0.1000000D+01  0.0000000D+00", "", 1)}, ("DRV_DOF.DAT: line 7: vlocy 1", "expected six numbers")),
         ]
         for change, words in cases:
             with self.subTest(words=words):
@@ -735,7 +786,7 @@ class Import(RunTestCase):
         laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
         moved = drive(2, 2, [("vlocy", k, 0.0, 0.1 * (k == 1), 9.0, 0.0, 1.0, 0.0) for k in (1, 2, 3)])
         contacts = "$icdan  DKJCx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      2  JONCx      1  noctc\n" + " " * 29 + \
-            values(n1=0.0, n2=1.0) + "\n" + " " * 29 + "gapTT " + real(0.0) + "\n"
+            values(n1=0.0, n2=1.0) + "\n" + " " * 29 + f"gapTT {real(0.0)}  rln/H {real(0.0)}  rlt/H {real(0.0)}\n"
         box = self.box(2, disk + wall, laws, moved, contacts=contacts)
         folder, _ = self.convert(box)
         made = sorted(os.listdir(folder))

@@ -155,7 +155,6 @@ FILES = [
         ("pressure", "1", ("0 where no component along normal is free",), {**PLANE, "free": [True, False], "mass": 1.0}),
         ("normal", "0, 0", ("not all 0",), {"shape": "plane"}),
     )),
-    boundary_key("velocity", "0.0, 0.1", "0 along each component that is free", also=LID),
     # a pressure without an area
     *((title, case(COLUMN, {"boundary": [{**LID, "pressure": 10.0, **lid}, *sides]}), ("boundary 'lid': pressure: expected", words))
       for title, lid, sides, words in (

@@ -134,6 +134,24 @@ class Forces(SmallScene):
                     self.verify(case, "speed of the grains [m/s]", record.velocity[:, :, 0], speed, 1e-9 * a)
         self.both(check)
 
+    def test_piston_that_moves_at_the_start(self):
+        """A piston with a velocity at the start is slowed down by its force, and meets a grain that stops it: both go on together."""
+        mass, force, speed = 1.3, 2.0, 0.4
+
+        def check(dimension):
+            along = np.eye(dimension)[0]
+            grain = Grain((RADIUS + 0.3) * along, radius=RADIUS, mass=MASS)
+            piston = plane(0 * along, along, free=[True, False, False][:dimension], mass=mass, force=floats(-force * along), velocity=floats(speed * along))
+            self.step = 1e-3
+            record = self.play(f"moving piston {dimension}", [grain], [piston], steps=100)
+            self.verify(f"piston with a velocity at the start, {dimension}D", "velocity [m/s]", record.boundary["velocity"][:, 0, 0],
+                        speed - force / mass * record.time, 1e-12)
+            near = self.play(f"moving piston that meets {dimension}", [Grain((RADIUS + 0.5 * self.step * speed) * along, radius=RADIUS, mass=MASS)],
+                             [{**piston, "force": floats(0 * along)}], steps=2)
+            self.verify(f"piston that meets a grain, {dimension}D", "velocity [m/s]", near.boundary["velocity"][-1, 0, 0],
+                        speed * mass / (mass + MASS), 1e-9)
+        self.both(check)
+
     def test_pressure(self):
         """Pressure moves a plane along its normal, with the area between the planes across; a second axis has the period."""
         def check(dimension):

@@ -288,6 +288,37 @@ class Samples(RunTestCase):
                 self.assertEqual(len(run.stderr.splitlines()), 1)
                 self.assertFalse(any(file.endswith((".h5", ".log")) for file in os.listdir(run.directory)))
 
+    def test_files_of_others_stay(self):
+        """A sample and its log are replaced, and an empty file; no other file is, whichever of the two names it has."""
+        small = merged(BASE, {"sample": {"count": 60}})
+        directory = self.here("others")
+        for _ in range(2):
+            self.assert_status(make(small, directory, ranks=2), 0)
+        own = sorted(name for name in os.listdir(directory) if name.startswith("sample.") and not name.endswith(".nml"))
+        self.assertEqual(own, ["sample.h5", "sample.log"])
+        # a file without the attribute, the bodies file of another program, and what is no HDF5 at all
+        for name, made_by in (("sample.h5", None), ("sample.h5", "gravier"), ("sample.h5", ""), ("sample.log", "")):
+            with self.subTest(name, made_by=made_by):
+                path = os.path.join(directory, name)
+                if made_by == "":
+                    write(path, "mine\n")
+                else:
+                    with h5py.File(path, "w") as file:
+                        file["mine"] = [1.0, 2.0]
+                        if made_by:
+                            file.attrs["made_by"] = made_by
+                with open(path, "rb") as file:
+                    before = file.read()
+                run = make(small, directory)
+                self.assert_status(run, 2)
+                self.assertIn("of another kind or origin, which is not replaced; expected the name of no file", run.stderr)
+                self.assertIn(f"there is a file {name} ", run.stderr)
+                self.assertEqual(len(run.stderr.splitlines()), 1)
+                with open(path, "rb") as file:
+                    self.assertEqual(file.read(), before)
+                write(path, "")
+                self.assert_status(make(small, directory), 0)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -16,6 +16,8 @@ module gravier_bodies_data
 
   !> The rows of this rank, in the order of the file, and all walls. SI units.
   type :: bodies_data_t
+    !> the program that writes them, which its file says; not allocated where nothing is written
+    character(len=:), allocatable :: made_by
     !> 2 or 3
     integer :: dimension = 0
     !> rows of this rank, and of all ranks together

@@ -274,6 +274,7 @@ contains
     if (allocated(sorted%shape)) words = words + 2 + size(sorted%orientation, 1)
     call file%reserve(bytes_of_headers + bytes_of_word*(sorted%total*words + sorted%n_walls*(1_i8 + 2*sorted%dimension) + &
       & bodies%contacts%total*contact_words(sorted%dimension)), error)
+    if (allocated(bodies%made_by)) call file%write_attribute("/", "made_by", bodies%made_by, error)
     call write_groups(comm, file, sorted, error)
     if (bodies%contacts%total > 0) call write_contacts(comm, file, bodies%contacts, error)
     if (present(shapes) .and. allocated(sorted%shape)) call write_body_shapes(file, sorted, shapes, error)

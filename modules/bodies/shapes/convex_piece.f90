@@ -9,7 +9,7 @@ module gravier_convex_piece
   implicit none
   private
   public :: convex_piece_t
-  public :: find_support, find_candidates, list_faces, number_of_sectors
+  public :: find_support, find_candidates, list_faces, number_of_sectors, shares_corner, first_of_corner
 
   type :: convex_piece_t
     !> the rounding, above 0
@@ -17,7 +17,8 @@ module gravier_convex_piece
     !> vertices of the core (nd, n); in 2D anticlockwise
     real(dp), allocatable :: vertex(:, :)
     !> the sharp corner behind each vertex, where the sides that meet there would meet without rounding (nd, n); the vertex itself
-    !> where the core has no sides: one vertex or two
+    !> where the core has no sides: one vertex or two. A corner where more than three faces meet may be behind several vertices, one
+    !> after the other: they are one point where another body touches them
     real(dp), allocatable :: corner(:, :)
     !> in 3D, faces of the core: vertices face_vertex(face_first(f):face_first(f + 1) - 1) of face f, anticlockwise seen from
     !> outside (faces + 1), unit normals to the outside (3, faces); all 0 in size where the core has no volume
@@ -46,6 +47,26 @@ module gravier_convex_piece
   real(dp), parameter :: ahead = 1.0e-9_dp
 
 contains
+
+  !> Whether the same sharp corner is behind two vertices.
+  pure logical function shares_corner(piece, v, w) result(shares)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: v, w
+
+    shares = .not. any(abs(piece%corner(:, v) - piece%corner(:, w)) > 0.0_dp)
+  end function shares_corner
+
+  !> The first of the vertices that the sharp corner behind `v` is behind.
+  pure integer function first_of_corner(piece, v) result(first)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: v
+
+    first = v
+    do while (first > 1)
+      if (.not. shares_corner(piece, first - 1, v)) return
+      first = first - 1
+    end do
+  end function first_of_corner
 
   !> The vertex that is farthest along a direction, the lowest of those equally far.
   pure subroutine find_support(piece, along, best)

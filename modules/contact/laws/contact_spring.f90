@@ -80,9 +80,9 @@ contains
     energy = energy + 0.5_dp*self%stiffness(2)*sum(elongation**2)
   end function spring_energy
 
-  !> Set the elongations at q_m of a contact that has kept `kept` of them. A contact that has kept none has none where its bodies touch,
-  !> if its velocities bring them together in this step or did so after the q_m of the last one, in which they pressed nothing then.
-  !> Otherwise it has none at the start of the step.
+  !> Set the elongations at q_m of a contact that has kept `kept` of them. A contact that has kept none has none where its bodies
+  !> touch, if its velocities bring them together in this step or did so after the q_m of the last one, in which they pressed
+  !> nothing then. Otherwise it has none at the start of the step.
   pure subroutine spring_step_stretches(self, kept, h, theta, gap)
     class(spring_step_t), intent(inout) :: self
     !> along the tangents [m]

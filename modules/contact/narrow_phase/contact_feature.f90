@@ -1,7 +1,7 @@
 !> What two pieces touch each other with: the face, edge or vertex of each that lies across a common normal.
 module gravier_contact_feature
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, shares_corner
   implicit none
   private
   public :: placement_t, feature_t, frame_t
@@ -78,7 +78,7 @@ contains
     call find_edge(piece, along, known, feature)
   end subroutine find_feature
 
-  !> The edge most across a direction, of those that have the given vertices.
+  !> The edge most across a direction, of those that have the given vertices. Between vertices of one corner there is none.
   pure subroutine find_edge(piece, along, known, feature)
     type(convex_piece_t), intent(in) :: piece
     real(dp), intent(in) :: along(3)
@@ -91,6 +91,7 @@ contains
     do e = piece%neighbour_first(feature%vertex), piece%neighbour_first(feature%vertex + 1) - 1
       k = piece%neighbour(e)
       if (any(known /= feature%vertex .and. known /= k)) cycle
+      if (shares_corner(piece, feature%vertex, k)) cycle
       side(:) = piece%vertex(:, k) - piece%vertex(:, feature%vertex)
       found = sine_of(side, along)
       if (found >= least) cycle

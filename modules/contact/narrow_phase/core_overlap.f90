@@ -10,7 +10,7 @@ module gravier_core_overlap
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, support_a, support_b, place_a, place_b
   implicit none
   private
-  public :: find_least_separation
+  public :: find_least_separation, find_separation_by_faces
 
   !> an axis is better than those before it if the separation is by this part of the sizes greater
   real(dp), parameter :: better = 1.0e-12_dp
@@ -47,10 +47,7 @@ contains
       n(:) = -a%face_normal(:, f)
       call try_axis(a, b, pair, n, of_a, found, taken)
     end do
-    do f = 1, size(b%face_normal, 2)
-      call turn(pair, b%face_normal(:, f), n)
-      call try_axis(a, b, pair, n, of_b, found, taken)
-    end do
+    call try_faces_of_b(a, b, pair, found)
     call find_edges(a, edges_a)
     call find_edges(b, edges_b)
     call try_edges(a, b, pair, edges_a, edges_b, found)
@@ -59,6 +56,31 @@ contains
     call find_any_axis(pair, edges_a, edges_b, a, b, n)
     call try_axis(a, b, pair, n, of_neither, found, taken)
   end subroutine find_least_separation
+
+  !> The same where the normals of the faces of the second piece are the only directions.
+  pure subroutine find_separation_by_faces(a, b, pair, found)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    type(core_distance_t), intent(inout) :: found
+
+    found%overlap = .true.
+    found%distance = -huge(1.0_dp)
+    call try_faces_of_b(a, b, pair, found)
+  end subroutine find_separation_by_faces
+
+  pure subroutine try_faces_of_b(a, b, pair, found)
+    type(convex_piece_t), intent(in) :: a, b
+    type(placed_pair_t), intent(in) :: pair
+    type(core_distance_t), intent(inout) :: found
+    real(dp) :: n(3)
+    integer :: f
+    logical :: taken
+
+    do f = 1, size(b%face_normal, 2)
+      call turn(pair, b%face_normal(:, f), n)
+      call try_axis(a, b, pair, n, of_b, found, taken)
+    end do
+  end subroutine try_faces_of_b
 
   !> Take an axis where it is better than that before.
   pure subroutine try_axis(a, b, pair, n, owner, found, taken)

@@ -5,11 +5,11 @@ module gravier_facet_contacts
   use gravier_facet, only: near_facets_t, find_foot, find_facet_normal, within
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
-  use gravier_core_overlap, only: find_least_separation
+  use gravier_core_overlap, only: find_least_separation, find_separation_by_faces
   use gravier_polygon_pair, only: placed_piece_t, find_polygon_manifold
   use gravier_polyhedron_pair, only: find_patch
   use gravier_flat_patch, only: make_facet_piece, set_facet_piece, lies_flat, find_flat_patch
-  use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for, has_point
+  use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for, has_point, rises
   use gravier_manifold, only: manifold_t
   implicit none
   private
@@ -289,7 +289,7 @@ contains
     type(core_distance_t), intent(inout) :: distance(:)
     type(facet_contacts_t), intent(inout) :: found
     type(facet_candidate_t) :: candidate
-    real(dp) :: normal(3), along, reach
+    real(dp) :: reach
     integer :: k
 
     call found%candidates%clear(near%n)
@@ -300,16 +300,51 @@ contains
       if (distance(k)%beyond) cycle
       if (distance(k)%overlap) call find_least_separation(piece, found%sheet, pair, distance(k))
       if (distance(k)%distance - reach > alert) cycle
-      normal(:) = found%sheet%face_normal(:, 1)
-      along = dot_product(normal, distance(k)%normal)
-      candidate = facet_candidate_t(place=k, distance=distance(k)%distance)
-      candidate%lies_along = norm2(distance(k)%normal - along*normal) <= aligned
-      if (candidate%lies_along) distance(k)%normal(:) = sign(1.0_dp, along)*normal
-      candidate%normal(:) = distance(k)%normal
-      candidate%foot(:) = distance(k)%point_b
+      call make_candidate(found%sheet, k, distance(k), candidate)
+      if (distance(k)%overlap .and. .not. candidate%lies_along) then
+        if (is_stopped(near, candidate, tolerance_for(near, reach))) then
+          call find_separation_by_faces(piece, found%sheet, pair, distance(k))
+          call make_candidate(found%sheet, k, distance(k), candidate)
+        end if
+      end if
       call found%candidates%add(candidate)
     end do
   end subroutine find_candidates
+
+  !> A candidate of the distance to a facet. A normal along that of the facet becomes this one.
+  pure subroutine make_candidate(sheet, place, distance, candidate)
+    !> the facet, and its place among those near
+    type(convex_piece_t), intent(in) :: sheet
+    integer, intent(in) :: place
+    type(core_distance_t), intent(inout) :: distance
+    type(facet_candidate_t), intent(out) :: candidate
+    real(dp) :: normal(3), along
+
+    normal(:) = sheet%face_normal(:, 1)
+    along = dot_product(normal, distance%normal)
+    candidate = facet_candidate_t(place=place, distance=distance%distance)
+    candidate%lies_along = norm2(distance%normal - along*normal) <= aligned
+    if (candidate%lies_along) distance%normal(:) = sign(1.0_dp, along)*normal
+    candidate%normal(:) = distance%normal
+    candidate%foot(:) = distance%point_b
+  end subroutine make_candidate
+
+  !> Whether another facet rises from the point of a candidate. A core that overlaps the facet may be least separated from it over
+  !> one of its sides; if the wall goes on there, this is no way out.
+  pure logical function is_stopped(near, candidate, tolerance)
+    type(near_facets_t), intent(in) :: near
+    type(facet_candidate_t), intent(in) :: candidate
+    !> of tolerance_for [m]
+    real(dp), intent(in) :: tolerance
+    integer :: k
+
+    is_stopped = .false.
+    do k = 1, near%n
+      if (k == candidate%place) cycle
+      is_stopped = rises(near%corner(:, :, k), candidate%normal, candidate%foot, tolerance, slack_of_pieces)
+      if (is_stopped) return
+    end do
+  end function is_stopped
 
   !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side,
   !> and nor have others at points of theirs.

@@ -5,7 +5,7 @@
 !> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, find_support
+  use gravier_convex_piece, only: convex_piece_t, find_support, shares_corner, first_of_corner
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
   use gravier_core_overlap, only: find_least_separation
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
@@ -115,12 +115,12 @@ contains
     end do
   end function needs_exact
 
-  !> Number of a feature among those of a piece.
+  !> Number of a feature among those of a piece. The vertices of a corner have one number.
   pure integer function number_of(piece, feature)
     type(convex_piece_t), intent(in) :: piece
     type(feature_t), intent(in) :: feature
 
-    number_of = feature%vertex - 1
+    number_of = first_of_corner(piece, feature%vertex) - 1
     if (feature%other > 0) number_of = edge_number(piece, feature%vertex, feature%other)
     if (feature%face > 0) number_of = face_number(piece, feature%face)
   end function number_of
@@ -157,7 +157,7 @@ contains
   end subroutine find_tangents
 
   !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the
-  !> plane, and all other vertices that are near enough. Keys are those of the piece's vertices.
+  !> plane, and all other corners that are near enough, each with its lowest vertex. Keys are those of the piece's vertices.
   pure subroutine find_halfspace_manifold(a, radius, normal, distance, alert, most, manifold)
     type(convex_piece_t), intent(in) :: a
     !> what the lengths of the piece are multiplied by [m]
@@ -200,10 +200,10 @@ contains
       corner(3) = dot_product(x, normal)
       ! most vertices are far from the plane
       if (.not. corner(3) + distance - radius*a%rounding < alert) cycle
-      if (any(vertex(1:m) == k)) cycle
+      if (.not. is_lowest(a, k, normal, vertex(1:m))) cycle
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
-      call add_point(point_of(k, corner), alert, radius, n, point)
+      call add_point(point_of(first_of_corner(a, k), corner), alert, radius, n, point)
     end do
     do k = 1, m
       call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
@@ -229,5 +229,28 @@ contains
     end function point_of
 
   end subroutine find_halfspace_manifold
+
+  !> Whether a vertex is the lowest of its corner, of several the first, and the corner is none of those taken.
+  pure logical function is_lowest(a, v, up, taken)
+    type(convex_piece_t), intent(in) :: a
+    integer, intent(in) :: v
+    !> unit vector, in the axes of the piece
+    real(dp), intent(in) :: up(3)
+    !> vertices
+    integer, intent(in) :: taken(:)
+    real(dp) :: above
+    integer :: w
+
+    is_lowest = .false.
+    do w = 1, size(taken)
+      if (shares_corner(a, v, taken(w))) return
+    end do
+    do w = first_of_corner(a, v), size(a%vertex, 2)
+      if (.not. shares_corner(a, v, w)) exit
+      above = dot_product(a%vertex(:, w) - a%vertex(:, v), up)
+      if (above < 0.0_dp .or. (w < v .and. above <= 0.0_dp)) return
+    end do
+    is_lowest = .true.
+  end function is_lowest
 
 end module gravier_polyhedron_pair

@@ -1,7 +1,7 @@
 !> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
 module gravier_shape_contacts
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, list_faces
+  use gravier_convex_piece, only: convex_piece_t, list_faces, shares_corner, first_of_corner
   use gravier_shape_library, only: shape_library_t, face_points
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
@@ -331,7 +331,8 @@ contains
     call turn_manifold(a%axes, manifold)
   end subroutine touch_plane
 
-  !> The points with a round surface: vertices, of a polygon the nearest and the nearer of those beside it.
+  !> The points with a round surface: corners, each with its nearest vertex, of a polygon the nearest and the nearer of those beside
+  !> it.
   subroutine touch_round_surface(piece, a, centre, boundary, alert, number, points)
     type(convex_piece_t), intent(in) :: piece
     type(seen_body_t), intent(in) :: a
@@ -358,17 +359,30 @@ contains
     end if
     do v = 1, size(gap)
       if (gap(v) > alert .or. (nd == 2 .and. v /= nearest .and. v /= beside)) cycle
+      if (.not. is_nearest_of_corner(v)) cycle
       call locate_vertex()
       manifold%n = 1
       manifold%normal(1:nd) = normal
       manifold%gap(1) = gap(v)
       manifold%point(:, 1) = vertex
       manifold%point(1:nd, 1) = vertex(1:nd) - (a%radius*piece%rounding + 0.5_dp*gap(v))*normal
-      manifold%key(1) = feature_base*v
+      manifold%key(1) = feature_base*first_of_corner(piece, v)
       call points%add(manifold, number, 1)
     end do
 
   contains
+
+    pure logical function is_nearest_of_corner(v)
+      integer, intent(in) :: v
+      integer :: w
+
+      is_nearest_of_corner = .false.
+      do w = first_of_corner(piece, v), size(gap)
+        if (.not. shares_corner(piece, v, w)) exit
+        if (gap(w) < gap(v) .or. (w < v .and. gap(w) <= gap(v))) return
+      end do
+      is_nearest_of_corner = .true.
+    end function is_nearest_of_corner
 
     !> Where vertex v is from the centre, and the surface from there.
     subroutine locate_vertex()

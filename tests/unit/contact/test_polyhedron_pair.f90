@@ -34,6 +34,7 @@ program test_polyhedron_pair
   call test_balls_and_rods()
   call test_overlap()
   call test_halfspace()
+  call test_corner_of_many_faces()
   call test_all_points()
   call test_keys_of_flush_faces()
   call test_swap()
@@ -417,6 +418,45 @@ contains
     call lie(box, vec(0.0_dp, 0.0_dp, 1.0_dp), 1.02_dp, manifold)
     call check_equal(manifold%n, 0, "beyond the alert distance of a plane")
   end subroutine test_halfspace
+
+  !> A corner where seven unlike faces meet has several vertices. On a plane, and on a face of another body, it is one point with
+  !> one key, whichever of its vertices is the lowest.
+  subroutine test_corner_of_many_faces()
+    type(body_shape_t) :: spike
+    type(manifold_t) :: manifold
+    type(error_t), allocatable :: error
+    type(vector_t) :: apex, up
+    type(turn_t) :: turn
+    real(dp) :: points(3, 8), height
+    integer :: k, key_on_plane, key_on_box
+
+    points(:, 8) = [0.0_dp, 0.0_dp, -1.0_dp]
+    do k = 1, 7
+      points(1, k) = 0.8_dp*cos(2*pi*k/7 + 0.1_dp*sin(3.0_dp*k))
+      points(2, k) = 0.6_dp*sin(2*pi*k/7 + 0.1_dp*sin(3.0_dp*k))
+      points(3, k) = 0.5_dp + 0.1_dp*cos(5.0_dp*k)
+    end do
+    call make_polyhedron("spike", points, 0.02_dp, spike, error)
+    call check(.not. allocated(error), "spike")
+    associate (piece => spike%piece(1))
+      k = size(piece%vertex, 2)
+      apex = vector_t(spike%size*piece%corner(:, minloc(piece%corner(3, :), dim=1)))
+      call check(count(abs(spike%size*piece%corner(3, :) - apex%x(3)) < tight) > 2, "spike: several vertices in its apex")
+    end associate
+    do k = 0, 24
+      turn = about(vec(cos(0.26_dp*k), sin(0.26_dp*k), 0.0_dp), 0.05_dp*mod(k, 5))
+      up = back(turn, vec(0.0_dp, 0.0_dp, 1.0_dp))
+      height = -dot_product(apex%x, up%x)
+      call lie(spike, up, height - 0.03_dp, manifold)
+      call check_equal(manifold%n, 1, "spike on a plane: points")
+      if (k == 0) key_on_plane = manifold%key(1)
+      call check_equal(manifold%key(1), key_on_plane, "spike on a plane: key")
+      call meet(spike, box, inverse(turn), vector_t(-(height + 0.97_dp)*up%x), manifold)
+      call check_equal(manifold%n, 1, "spike on a box: points")
+      if (k == 0) key_on_box = manifold%key(1)
+      call check_equal(manifold%key(1), key_on_box, "spike on a box: key")
+    end do
+  end subroutine test_corner_of_many_faces
 
   !> All points of faces of twelve corners, and some of them.
   subroutine test_all_points()
