@@ -18,6 +18,15 @@ UNITS = [(r"kinetic_|potential_energy|_work$|dissipated_|carried_away|energy_err
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
 
 
+def label_of_all(name, dimensions):
+    """Name of a column of history.csv of several runs: with both units where those of the plane have another one."""
+    labels = [label_of(name, dimension) for dimension in sorted(set(dimensions))]
+    if len(set(labels)) == 1:
+        return labels[0]
+    name, units = labels[0].split(" [")[0], [label.split(" [")[1].removesuffix("]") for label in labels]
+    return f"{name} [{units[0]} in 2D, {units[1]} in 3D]"
+
+
 def label_of(name, dimension):
     """Name of a column of history.csv with its unit."""
     text = NAMES.get(name, name.replace("_", " "))
@@ -93,14 +102,20 @@ class Panel:
         self.label, self.curves, self.goals, self.counts = label, curves, list(goals), counts
 
     def draw(self, axes, colours=LINES):
+        values = numpy.concatenate([numpy.asarray(y, float) for _, y, _ in self.curves] + [[value] for value, _ in self.goals])
+        scale, low, _ = limits_of(values, not self.counts)
         for k, (x, y, name) in enumerate(self.curves):
+            if scale == "log" and name and not (numpy.asarray(y) > 0.0).any():
+                name += ": 0"
             axes.plot(x, y, color=colours[k % len(colours)], linestyle=STYLES[k // len(colours) % len(STYLES)], linewidth=1.2, label=name,
                       marker="o" if len(x) <= 50 else None, markersize=3)
         for value, name in self.goals:
             axes.axhline(value, color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=name)
         grid(axes)
-        values = [numpy.asarray(y, float) for _, y, _ in self.curves] + [[value] for value, _ in self.goals]
-        fit_axis(axes.yaxis, numpy.concatenate(values), self.label, not self.counts)
+        fit_axis(axes.yaxis, values, self.label, not self.counts)
+        positive = values[numpy.isfinite(values) & (values > 0.0)]
+        if scale == "log" and positive.min() < low:
+            axes.text(0.995, 0.03, f"values go down to {positive.min():.1g}", transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="0.35")
         legend_above(axes)
 
 
@@ -125,7 +140,7 @@ def draw_history(runs, columns):
             if name not in history:
                 raise PictureError(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
     names = names_of(runs) if len(runs) > 1 else [None]
-    panels = [Panel(label_of(column, runs[0].dimension), [(history.time, history[column], name if k == 0 else None)
+    panels = [Panel(label_of_all(column, [run.dimension for run in runs]), [(history.time, history[column], name if k == 0 else None)
                                                           for name, history in zip(names, histories)], counts=column == "iterations")
               for k, column in enumerate(columns)]
     return draw_panels(panels)

@@ -92,6 +92,8 @@ def draw(options):
     out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{options.kind}.png")
     if options.kind != "movie":
         claim(out, PICTURES)
+    if sample and (options.regions or options.chains):
+        raise PictureError(f"{directories[0]}: a bodies file has no regions and no chains; expected no --regions and no --chains, or the directory of a run")
     runs = [gravier.BodiesFile(directories[0])] if sample else [gravier.Run(directory) for directory in directories]
     if options.kind in ("packing", "movie") and options.colour is None:
         options.colour = "radius" if sample else "speed"

@@ -4,7 +4,8 @@ import numpy
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
 from matplotlib.colors import to_rgba
-from palette import CHAINS, PLAIN
+from matplotlib.ticker import MaxNLocator
+from palette import CHAINS, PLAIN, PULLS
 from picture_regions import draw_regions, region_corners
 from picture_space import View, Walls, box_around, draw_flat_walls, draw_space
 from picture_style import SPEEDS, TURNS, PictureError, colours_of_kinds, scaled
@@ -85,10 +86,13 @@ def add_legend(figure, axes, values, label, how, names=None):
     if names is None:
         below, above = values.min() < norm.vmin - 1e-9 * abs(norm.vmin), values.max() > norm.vmax + 1e-9 * abs(norm.vmax)
         ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[below, above]
-    bar = figure.colorbar(ScalarMappable(**how), cax=axes.inset_axes([1.02, 0.0, 0.025, 1.0]), label=label, extend=ends)
+    # a narrow picture has a bar of some width, too
+    place = axes.get_position(original=True)
+    wide = min(figure.get_figwidth() * place.width, figure.get_figheight() * place.height * numpy.ptp(axes.get_xlim()) / numpy.ptp(axes.get_ylim()))
+    bar = figure.colorbar(ScalarMappable(**how), cax=axes.inset_axes([1.0 + max(0.02, 0.1 / wide), 0.0, max(0.025, 0.12 / wide), 1.0]), label=label,
+                          extend=ends)
     if names is not None:
-        shown = numpy.unique(values)
-        bar.set_ticks(shown, labels=[names[number - 1] for number in shown])
+        bar.set_ticks(numpy.arange(len(names)) + 1, labels=names)
 
 
 # ---- bodies
@@ -154,24 +158,31 @@ def shaded_spheres(place, diameter, values, style, axes):
 
 
 def draw_chains(axes, run, step, view, force):
-    """Force chains: a segment for each loaded contact, as thick as its normal force; `force` is that of the thickest."""
+    """Force chains: a segment for each loaded contact, as thick as its normal force, in another colour where it pulls; `force` is that of
+    the thickest."""
     segments, normal = run.chains(step)
-    top = force or normal.max(initial=0.0)
-    loaded = normal > FAINTEST * top
-    if not loaded.any():
-        return
-    axes.add_collection(LineCollection(view.place(segments[loaded]), linewidths=WIDEST * normal[loaded] / top, colors=CHAINS,
-                                       capstyle="round", zorder=2))
-    axes.plot([], [], color=CHAINS, linewidth=WIDEST, label=f"normal force {float(f'{top:.2g}'):g} N")
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8)
+    top = force or numpy.abs(normal).max(initial=0.0)
+    for sign, colour, what in ((1.0, CHAINS, "normal force"), (-1.0, PULLS, "pull")):
+        loaded = sign * normal > FAINTEST * top
+        if not loaded.any():
+            continue
+        axes.add_collection(LineCollection(view.place(segments[loaded]), linewidths=WIDEST * numpy.abs(normal[loaded]) / top, colors=colour,
+                                           capstyle="round", zorder=2))
+        axes.plot([], [], color=colour, linewidth=WIDEST, label=f"{what} {float(f'{top:.2g}'):g} N")
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 1.0), borderaxespad=0.0, frameon=False, fontsize=8, ncol=2)
 
 
-def draw_cell(axes, run, step):
-    """The edges of a periodic cell that moves, from the corner of the box that bodies are kept in."""
-    cell = run.cell(step)
-    if cell is not None:
-        corners = cell.origin.ravel() + numpy.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ cell.edge
-        axes.plot(*corners.T, color="0.35", linewidth=0.9, linestyle="--", zorder=1)
+def cell_corners(run, step):
+    """Corners of a periodic cell of the plane that moves, in order around it (5, 2), from the corner of the box that bodies are kept in."""
+    cell = run.cell(step) if run.dimension == 2 else None
+    if cell is None:
+        return numpy.zeros((0, run.dimension))
+    return cell.origin.ravel() + numpy.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ cell.edge
+
+
+def points_of(run, step, options):
+    """Points that a picture must hold beside bodies and walls: corners of a moving cell, and of regions on request."""
+    return numpy.concatenate([cell_corners(run, step), region_corners(run.case, run.dimension) if options.regions else numpy.zeros((0, run.dimension))])
 
 
 # ---- a picture
@@ -198,8 +209,7 @@ def draw_packing(run, step, options, frame=None):
     if len(bodies) == 0:
         raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
     view, walls = View(run.dimension, *options.view), Walls(run, step)
-    held = region_corners(run.case, run.dimension) if options.regions else ()
-    box = box_around(bodies, walls, held) if frame.low is None else (frame.low, frame.high)
+    box = box_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
     low, high = view.extent(*box)
     size = (high - low) / (high - low).max()
     figure, axes = plt.subplots(figsize=(options.size * size[0] + 1.3, options.size * size[1] + 0.9))
@@ -215,9 +225,11 @@ def draw_packing(run, step, options, frame=None):
     if chains:
         draw_chains(axes, run, step, view, frame.force)
     if view.flat:
-        draw_cell(axes, run, step)
+        axes.plot(*cell_corners(run, step).T, color="0.35", linewidth=0.9, linestyle="--", zorder=1)
         draw_flat_walls(axes, walls, low, high)
         axes.set(xlabel="x [m]", ylabel="y [m]")
+        # as many numbers as have room
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=max(1, min(8, round(2.0 * options.size * size[0])))))
     else:
         draw_space(axes, view, walls, *box)
         axes.set_axis_off()
@@ -236,14 +248,14 @@ def shared_frame(run, steps, options):
     lows, highs, limits, force = [], [], [], 0.0
     for step in steps:
         bodies = run.bodies(step)
-        low, high = box_around(bodies, Walls(run, step), region_corners(run.case, run.dimension) if options.regions else ())
+        low, high = box_around(bodies, Walls(run, step), points_of(run, step, options))
         lows.append(low)
         highs.append(high)
         values = None if options.colour in KINDS else quantity(run, step, bodies, options.colour)[0]
         if values is not None and values.any():
             limits.append(spread(values, options.colour))
         if options.chains and run.contacts(step) is not None:
-            force = max(force, run.chains(step)[1].max(initial=0.0))
+            force = max(force, numpy.abs(run.chains(step)[1]).max(initial=0.0))
     if not lows:
         raise PictureError(f"{run.path}: no body in any step; expected one at least")
     return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), shared_limits(limits), force or None)

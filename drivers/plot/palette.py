@@ -2,6 +2,8 @@
 # slow is nearly white, so that the chains stand out; red on blue is safe for the colour-blind
 SHADES = ["#f4f8fc", "#9ecae1", "#4292c6", "#08519c", "#08306b"]
 CHAINS = "#b2182b"
+#: of chains that pull, lighter
+PULLS = "#E69F00"
 #: of bodies without a quantity
 PLAIN = "#dbe7f3"
 #: of Okabe and Ito, for curves

@@ -78,5 +78,7 @@ def draw_lines(axes, view, lines, colour, dash, name=None, place=None):
     axes.add_collection(LineCollection([view.place(line) for line in lines], colors=colour, linewidths=1.2 if name else 0.9,
                                        linestyles=dash, zorder=3.5))
     if name:
-        axes.annotate(name, view.place(place), xytext=(-2, -2), textcoords="offset points", ha="right", va="top", fontsize=8, zorder=4,
+        # a corner may be outside of the picture
+        inside = numpy.clip(view.place(place), *numpy.transpose([axes.get_xlim(), axes.get_ylim()]))
+        axes.annotate(name, inside, xytext=(-2, -2), textcoords="offset points", ha="right", va="top", fontsize=8, zorder=4,
                       bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8})

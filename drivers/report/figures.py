@@ -64,7 +64,7 @@ def accuracy_panels(history, solver):
 
 def motion_panels(history):
     """Energies, contacts and grains."""
-    terms = [name for name in ("potential_energy", "dissipated_normal", "dissipated_friction", "boundary_work") if name in history]
+    terms = [name for name in ("potential_energy", "dissipated_normal", "dissipated_friction", "elastic_energy", "boundary_work") if name in history]
     panels = []
     if "kinetic_energy" in history:
         panels.append(panel(history, "kinetic energy [J]", [(None, history.kinetic_energy)]))

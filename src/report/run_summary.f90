@@ -47,6 +47,9 @@ contains
             & " of their residuals alone; at worst "//to_text(tally%worst_residual, 3)
         else
           text = text//"; at worst "//to_text(effort%worst, 3)
+          ! the velocity error in a norm of one of the conditions may be larger than its mean over all mass
+          if (simulation%config%solver%criterion == "velocity_error" .and. effort%worst > 1.001_dp*tally%worst_error) &
+            & text = text//" in the strictest of its conditions"
         end if
       end if
       text = text//"; "//trim(adjustl(mean))//" iterations a solve"

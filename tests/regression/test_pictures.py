@@ -7,6 +7,7 @@ import sys
 import types
 import unittest
 
+import matplotlib.colors
 import matplotlib.image
 import matplotlib.pyplot as plt
 import numpy as np
@@ -105,6 +106,14 @@ class Axes(unittest.TestCase):
                                        ("force_x:lid", 3, "force x:lid [N]"), ("energy_error", 2, "energy error [J]"),
                                        ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]")):
             self.assertEqual(curve_pictures.label_of(name, dimension), label)
+        for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):
+            self.assertEqual(curve_pictures.label_of_all(name, [3, 2, 3]), label)
+        figure, axes = plt.subplots()
+        curve_pictures.Panel("energy [J]", [(np.arange(99), np.geomspace(1e-3, 1.0, 99), "a"), (np.arange(99), np.zeros(99), "b"),
+                                            (np.arange(2), np.array([1.0, 1e-30]), "c")]).draw(axes)
+        self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["a", "b: 0", "c"])
+        self.assertEqual([text.get_text() for text in axes.texts], ["values go down to 1e-30"])
+        plt.close(figure)
         figure, axes = plt.subplots()
         curve_pictures.fit_axis(axes.yaxis, np.array([0.0, 25000.0]), "pressure [Pa]")
         self.assertEqual((axes.get_ylabel(), axes.yaxis.get_major_formatter()(20000.0, 0)), ("pressure [$10^{3}$ Pa]", "20"))
@@ -166,7 +175,45 @@ class Pictures(RunTestCase):
         figure = packing_picture.draw_packing(self.disks, None, self.options(colour="material"))
         figure.canvas.draw()
         bar = figure.axes[0].child_axes[0]
-        self.assertEqual([text.get_text() for text in bar.get_yticklabels()], ["sand"])
+        # each band of the bar has its name, also where no body has the material
+        self.assertEqual([text.get_text() for text in bar.get_yticklabels()], ["sand", "plate"])
+        plt.close(figure)
+
+    def test_narrow(self):
+        """The bar of colours of a picture that is ten times as high as wide can be read."""
+        column = {"scene": {"bodies": "column", "column_count": 20, "radius": 0.01, "wall_material": None}, "material": [], "law": [], "region": [],
+                  "time": {"step": 1e-3, "steps": 10}, "output": {"vtk": False}}
+        gravier.run(merged(DISKS, {"scene": {"lattice_count": None, "radius_min": None, "radius_max": None}}, column), self.here("column"))
+        figure = packing_picture.draw_packing(gravier.Run(self.here("column/results")), None, self.options())
+        box = self.boxes(figure, [figure.axes[0].child_axes[0]])[0]
+        self.assertGreater((box[2] - box[0]) / figure.dpi, 0.08)
+        plt.close(figure)
+
+    def test_pulls(self):
+        """Bonds that pull are drawn, as thick as their force, in a colour of their own."""
+        case = {"scene": {"bodies": "column", "column_count": 4, "radius": 0.01, "gravity": [0.0, 9.81], "wall_material": "m"},
+                "material": [{"name": "m"}], "law": [{"materials": ["m"], "kind": "bonded", "bond_strength": 1e3, "bond_friction": 0.5, "bond_distance": 1e-6}],
+                "time": {"step": 1e-3, "steps": 5}, "output": {"directory": "results", "every": 5, "contacts": True}}
+        self.assertEqual(gravier.run(case, self.here("hanging")), 0)
+        figure = packing_picture.draw_packing(gravier.Run(self.here("hanging/results")), None, self.options(chains=True))
+        drawn = next(one for one in figure.axes[0].collections if hasattr(one, "get_segments") and one.get_segments()
+                     and tuple(one.get_colors()[0]) == matplotlib.colors.to_rgba(palette.PULLS))
+        np.testing.assert_allclose(sorted(drawn.get_linewidths()), packing_picture.WIDEST * np.array([0.25, 0.5, 0.75, 1.0]), rtol=1e-3)
+        self.assertRegex(figure.axes[0].get_legend().get_texts()[0].get_text(), r"^pull \S+ N$")
+        plt.close(figure)
+
+    def test_cell_that_moves(self):
+        """The whole outline of a sheared cell is on the picture."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [5, 5], "radius_min": 0.008, "radius_max": 0.008, "period": [0.1, 0.1],
+                          "cell_shear_rate": 5.0, "gravity": [0.0, 0.0]},
+                "time": {"step": 1e-3, "steps": 100}, "output": {"directory": "results", "every": 100}}
+        self.assertEqual(gravier.run(case, self.here("sheared")), 0)
+        run = gravier.Run(self.here("sheared/results"))
+        corners = packing_picture.cell_corners(run, 100)
+        self.assertGreater(np.ptp(corners[:, 0]), 0.12)
+        figure = packing_picture.draw_packing(run, None, self.options())
+        limits = np.array([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).T
+        self.assertTrue(np.all(corners >= limits[0]) and np.all(corners <= limits[1]))
         plt.close(figure)
 
     def test_walls_in_space(self):
@@ -212,6 +259,10 @@ class Pictures(RunTestCase):
         for corner in (*rows.lower, *rows.upper, [0.03, 0.02], [0.1, 0.08]):
             self.assertLess(np.linalg.norm(lines - corner, axis=1).min(), 1e-12, corner)
         self.assertEqual([text.get_text() for text in figure.axes[0].texts], ["region middle", "region layers"])
+        # the corner of the upper one is above the picture, and its name is in it
+        for text in figure.axes[0].texts:
+            place = np.array([text.xy, text.xy])
+            np.testing.assert_array_equal(place, np.clip(place, *np.transpose([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()])))
         plt.close(figure)
         case = {"insertion": [{"lower": [0.0, 1.0], "upper(1)": 2.0, "upper(2)": 3.0}, {"region": "ball", "centre": [5.0, 5.0], "region_radius": 1.0}]}
         np.testing.assert_array_equal(packing_picture.region_corners(case, 2), [[0, 1], [2, 3], [4, 4], [6, 6]])

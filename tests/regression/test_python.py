@@ -236,6 +236,8 @@ class Package(RunTestCase):
         self.assertEqual((status, said), (0, "bare.png\n"))
         for arguments, message in ((("two.h5", "--colour", "speed"), "two.h5: no velocities; expected another --colour"),
                                    (("two.h5", "--colour", "pressure"), "two.h5: a bodies file has no contacts"),
+                                   (("two.h5", "--regions"), "two.h5: a bodies file has no regions and no chains"),
+                                   (("two.h5", "--chains"), "two.h5: a bodies file has no regions and no chains"),
                                    (("two.h5", "--colour", "subdomain"), "two.h5: a bodies file has no subdomains"),
                                    (("heap/results/results.h5",), "no /bodies with id, position and radius; expected a bodies file"),
                                    (("none.h5",), "none.h5: cannot read this file; expected a bodies file")):

@@ -42,7 +42,8 @@ def given_contacts(run, step=None):
 
 def write_bodies(run, path, step=None):
     """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
-    and periods are those of its input; walls of a bodies file are in this one. A file that is there is replaced where this function has made it."""
+    and periods are those of its input; walls of a bodies file are in this one. A cell that moves has no such file. A file that is there is
+    replaced where this function has made it."""
     try:
         check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [run.path])
     except Misplaced as refused:
@@ -50,6 +51,8 @@ def write_bodies(run, path, step=None):
     if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
         raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
                            "&output writes such a file of the last state")
+    if run.cell(step) is not None:
+        raise ResultsError(f"{run.path}: a periodic cell that moves: expected a run whose periods stay; a checkpoint holds such a cell")
     bodies, boundaries = run.bodies(step), run.boundaries(step)
     contacts, names = given_contacts(run, step)
     with whole_file(path) as part, hdf5_file(part, PROGRAM) as file:
