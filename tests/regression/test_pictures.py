@@ -103,7 +103,7 @@ class Axes(unittest.TestCase):
     def test_labels(self):
         for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
                                        ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
-                                       ("force_x:lid", 3, "force x:lid [N]"), ("energy_error", 2, "energy error [J]"),
+                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
                                        ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]")):
             self.assertEqual(curve_pictures.label_of(name, dimension), label)
         for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):

@@ -430,14 +430,14 @@ class Diagnostics(RunTestCase):
         plain = self.run_here("plain", case, boundaries)
         columns = len(plain.history())
         self.assertFalse([name for name in plain.results() if "diagnostics" in name])
-        more = {"energy": 10, "stress": 7, "structure": 13, "boundary_forces": 4 * len(boundaries)}
+        more = {"energy": 10, "stress": 7, "structure": 13, "boundary_forces": 4 * len(boundaries), "boundary_moments": len(boundaries)}
         for group, count in more.items():
             run = self.run_here(group, merged(case, {"output": {group: True}}), boundaries)
             history, results = run.history(), run.results()
             self.assertEqual(len(history), columns + count, group)
             for step in steps_of(results)[1:]:
                 attributes = [name for name in results if name.startswith(f"/steps/{step}/diagnostics@")]
-                self.assertEqual(len(attributes), 0 if group == "boundary_forces" else count, group)
+                self.assertEqual(len(attributes), 0 if group.startswith("boundary_") else count, group)
             # nothing else changes
             for name, values in plain.history().items():
                 if not name.endswith("_seconds"):

@@ -5,7 +5,7 @@ import numpy as np
 
 from gravier_runs import LONG
 
-from small_scenes import EPS, G, Grain, SmallScene, floats, plane
+from small_scenes import EPS, G, INERTIA, Grain, SmallScene, floats, plane
 
 RADIUS, MASS = 0.05, 0.7
 
@@ -132,6 +132,45 @@ class Forces(SmallScene):
                     speed = a * record.time[:, None]
                     self.verify(case, "speed of the piston [m/s]", record.boundary["velocity"][:, 0, :1], speed, 1e-9 * a)
                     self.verify(case, "speed of the grains [m/s]", record.velocity[:, :, 0], speed, 1e-9 * a)
+        self.both(check)
+
+    def test_moments(self):
+        """The angular momentum of grains in a drum that turns and falls, about its axis, changes by the moment of gravity and the opposite of
+        the moments on the drum and on a paddle of glued grains in it, with rolling friction and, in space, all three components."""
+        def check(dimension):
+            nd, up = dimension, np.eye(dimension)[-1]
+            self.step = 1.0 / 4096
+            rng = np.random.default_rng(3)
+            places = [np.array([x, z]) for x in np.arange(-0.19, 0.2, 0.125) for z in np.arange(-0.25, 0.0, 0.125)]
+            if dimension == 3:
+                places = [np.array([y, *place]) for place in places for y in (-0.1, 0.02)]
+            glued = [[0.0] * (nd - 2) + [0.05, 0.06], [0.0] * (nd - 2) + [-0.33, -0.02]]
+            grains = [Grain(place + rng.uniform(-0.01, 0.01, nd), radius=RADIUS, mass=MASS) for place in places]
+            grains += [Grain(place, radius=RADIUS, mass=MASS, group=1) for place in glued]
+            laws = {"friction": 0.5, "rolling_friction": 0.2, **({"pivoting_friction": 0.1} if dimension == 3 else {})}
+            turning = {"velocity": floats(-0.1 * up), **({"rotation": 3.0} if dimension == 2 else {"rotation": [3.0, 0.0, 0.0]})}
+            drum = {"name": "drum", "shape": "circle", "point": [0.0, 0.0], "radius": 0.4, **turning, **laws}
+            if dimension == 3:
+                drum.update(shape="cylinder", point=[0.0, 0.0, 0.0], axis=[1.0, 0.0, 0.0])
+            paddle = {"name": "paddle", "shape": "grains", "group": 1, "pivot": [0.0] * nd, **turning, **laws}
+            record = self.play(f"drum {dimension}", grains, [drum, paddle], floats(-G * up), 1100, scene=laws, solver={"criterion": "velocity_error", "tolerance": 1e-2},
+                               output={"every": 1, "boundary_moments": True, "boundary_forces": True})
+            history = record.run.history()
+            free = slice(0, len(places))
+            middle = record.position[:-1, free] + 0.5 * self.step * record.velocity[:-1, free] - record.boundary["position"][:-1, :1] \
+                + 0.05 * self.step * up
+            change = np.diff(record.velocity[:, free], axis=0) / self.step
+            spin = INERTIA[dimension] * RADIUS**2 * np.diff(record.spin[:, free], axis=0) / self.step
+            cross = np.cross(middle, change + G * up)
+            balance = MASS * (cross.reshape(*cross.shape[:2], -1) + spin).sum(axis=1)
+            names = ["z"] if dimension == 2 else ["x", "y", "z"]
+            found = np.column_stack([history[f"moment_{name}:drum"] + history[f"moment_{name}:paddle"] for name in names])
+            whole = np.abs(found).max()
+            self.assertGreater(whole, 1.0)
+            for one in ("drum", "paddle"):
+                self.assertGreater(np.abs(history[f"moment_{names[0]}:{one}"]).max(), 0.1 * whole)
+            # levers of disks and spheres are their radii: gaps of the drum and overlaps between grains are what is left
+            self.verify(f"grains in a drum, {dimension}D", "moments [N m]", -found, balance, 2e-4 * whole)
         self.both(check)
 
     def test_piston_that_moves_at_the_start(self):

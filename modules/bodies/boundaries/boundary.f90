@@ -67,6 +67,7 @@ module gravier_boundary
     procedure :: turns => boundary_turns
     procedure :: turns_about => boundary_turns_about
     procedure :: half_width => boundary_half_width
+    procedure :: find_image
     procedure :: locate => boundary_locate
     procedure :: find_corners => boundary_find_corners
     procedure :: velocity_at => boundary_velocity_at

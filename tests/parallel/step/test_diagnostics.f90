@@ -111,6 +111,7 @@ program test_diagnostics
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics, diagnostic_place
   use gravier_diagnostics, only: diagnostics_t
   use gravier_boundary_forces, only: boundary_forces_t
+  use gravier_boundary_moments, only: boundary_moments_t
   use gravier_contact_structure, only: contact_structure_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use own_diagnostics, only: counter_t, least_t
@@ -205,7 +206,7 @@ contains
 
     call make_scene(comm, case_text//" &output every = 2 /", sim)
     allocate (list(1)%diagnostic, source=counter_t())
-    allocate (list(2)%diagnostic, source=boundary_forces_t())
+    allocate (list(2)%diagnostic, source=boundary_moments_t())
     allocate (list(3)%diagnostic, source=least_t())
     call sim%diagnostics%take(sim%decomposition, sim%physics, list, [.true., .false., .true.])
     call check_equal(size(sim%diagnostics%asked), 2, "two of three are asked for")
@@ -336,6 +337,11 @@ contains
     k = 4*size(sim%decomposition%boundaries) - 1
     call check_equal(trim(sim%diagnostics%name(k)), "position_x:belt", "a boundary that moves")
     call check_close(sim%diagnostics%value(k), 1.005_dp, 1.0e-15_dp, "its place is that of the end of the step")
+    call sim%free()
+    call make_scene(comm, case_text//" &output boundary_forces = T, boundary_moments = T /", sim)
+    k = 4*size(sim%decomposition%boundaries) + 1
+    call check_equal(sim%diagnostics%n_columns, k - 1 + size(sim%decomposition%boundaries), "a moment of each boundary")
+    call check_equal(trim(sim%diagnostics%name(sim%diagnostics%n_columns)), "moment_z:a_b_c", "about the third axis")
     call sim%free()
   end subroutine test_boundary_forces
 
