@@ -2,6 +2,7 @@
 module gravier_body_collector
   use gravier_periodic, only: shift_code
   use gravier_kinds, only: dp, i8
+  use gravier_boundary, only: boundary_t
   use gravier_body_mass, only: invert_symmetric, multiply_symmetric
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_body_store, only: collect_fields
@@ -14,13 +15,15 @@ module gravier_body_collector
 
 contains
 
-  !> Grains owned by this rank: the table `bodies` with the key `id`, and the fields that gravier_body_store has for files.
+  !> Grains owned by this rank: the table `bodies` with the key `id`, the fields that gravier_body_store has for files and, where
+  !> some are glued to boundaries, `boundary`: the identifier of the boundary that a grain is part of, 0 of a free one.
   subroutine collect_bodies(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
+    integer(i8), allocatable :: boundary(:, :)
     integer :: s, k, n
 
-    associate (owned => simulation%decomposition%owned)
+    associate (owned => simulation%decomposition%owned, boundaries => simulation%decomposition%boundaries)
       call table%init("bodies", "id", sum(owned%n))
       n = 0
       do s = 1, size(owned)
@@ -30,8 +33,28 @@ contains
         end do
       end do
       call collect_fields(simulation%decomposition%layout(), owned, table)
+      if (.not. has_glued(boundaries)) return
+      allocate (boundary(1, sum(owned%n)), source=0_i8)
+      n = 0
+      do s = 1, size(owned)
+        do k = 1, owned(s)%n
+          n = n + 1
+          if (owned(s)%glued(k) > 0) boundary(1, n) = boundaries(owned(s)%glued(k))%id
+        end do
+      end do
     end associate
+    call table%add_whole("boundary", "", boundary, .true.)
   end subroutine collect_bodies
+
+  pure logical function has_glued(boundaries)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer :: b
+
+    has_glued = .false.
+    do b = 1, size(boundaries)
+      has_glued = has_glued .or. boundaries(b)%is_glued()
+    end do
+  end function has_glued
 
   !> Where all boundaries are, how they move and what the grains did to them in the last step: the table `boundaries` with the key
   !> `id`, the same on all ranks. Where some have facets, `axes` are those of their files, one after the other.

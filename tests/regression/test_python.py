@@ -107,6 +107,13 @@ class Package(RunTestCase):
         # sum of f_n R over all ends is that of p d V over all bodies
         ends = bodies.radius[contacts.candidate - 1] + np.where(between, bodies.radius[np.minimum(contacts.antagonist, 36) - 1], 0.0)
         self.assertAlmostEqual((run.pressure() * 2.0 * math.pi * bodies.radius**2).sum() / (force * ends).sum(), 1.0, places=12)
+        # the same in global axes: at rest the candidate of a contact has the half of its gap behind its surface
+        forces = run.forces()
+        self.assertTrue(np.array_equal(forces.antagonist, contacts.antagonist))
+        np.testing.assert_allclose((forces.force * contacts.normal).sum(axis=1), force, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(forces.force[ground].sum(axis=0), -boundaries.force[boundaries.id == contacts.antagonist[ground][0]][0], atol=1e-9)
+        arm = forces.point - (bodies.position - 0.5e-3 * bodies.velocity)[contacts.candidate - 1]
+        np.testing.assert_allclose(arm, -(bodies.radius[contacts.candidate - 1] + 0.5 * contacts.gap)[:, None] * contacts.normal, atol=1e-12)
         weight = (2500.0 if "density" not in run.case["scene"][0] else 0.0) * math.pi * (bodies.radius**2).sum() * 9.81
         self.assertAlmostEqual(-boundaries.force[:, 1].sum() / weight, 1.0, delta=0.05)
 

@@ -3,6 +3,7 @@ import unittest
 
 import numpy as np
 
+import gravier
 from gravier_runs import LONG
 
 from small_scenes import EPS, G, INERTIA, Grain, SmallScene, floats, plane
@@ -154,7 +155,7 @@ class Forces(SmallScene):
                 drum.update(shape="cylinder", point=[0.0, 0.0, 0.0], axis=[1.0, 0.0, 0.0])
             paddle = {"name": "paddle", "shape": "grains", "group": 1, "pivot": [0.0] * nd, **turning, **laws}
             record = self.play(f"drum {dimension}", grains, [drum, paddle], floats(-G * up), 1100, scene=laws, solver={"criterion": "velocity_error", "tolerance": 1e-2},
-                               output={"every": 1, "boundary_moments": True, "boundary_forces": True})
+                               output={"every": 1, "contacts": True, "boundary_moments": True, "boundary_forces": True})
             history = record.run.history()
             free = slice(0, len(places))
             middle = record.position[:-1, free] + 0.5 * self.step * record.velocity[:-1, free] - record.boundary["position"][:-1, :1] \
@@ -171,7 +172,23 @@ class Forces(SmallScene):
                 self.assertGreater(np.abs(history[f"moment_{names[0]}:{one}"]).max(), 0.1 * whole)
             # levers of disks and spheres are their radii: gaps of the drum and overlaps between grains are what is left
             self.verify(f"grains in a drum, {dimension}D", "moments [N m]", -found, balance, 2e-4 * whole)
+            self.check_forces(gravier.Run(record.run.path("results")), [drum, paddle], history, names, whole)
         self.both(check)
+
+    def check_forces(self, run, boundaries, history, names, whole):
+        """The forces and moments that Python makes of the contacts are those on the boundaries, whose glued grains it knows."""
+        for step in run.steps[5::97]:
+            bodies, rows, forces = run.bodies(step), run.boundaries(step), run.forces(step)
+            part_of = dict(zip(bodies.id, bodies.boundary)) | {number: number for number in rows.id}
+            for number, boundary in zip(rows.id, boundaries):
+                sign = np.array([(part_of[a] == number) * -1.0 + (part_of[c] == number) for c, a in zip(forces.candidate, forces.antagonist)])
+                pivot = run.boundaries(step).position[rows.id == number][0] - 0.5 * run.time_step() * np.array(boundary["velocity"])
+                name = boundary["name"]
+                force = (sign[:, None] * forces.force).sum(axis=0)
+                np.testing.assert_allclose(force, [history[f"force_{axis}:{name}"][step - 1] for axis in "xyz"[:run.dimension]], rtol=0, atol=1e-9 * whole)
+                moment = np.cross(forces.point - pivot, forces.force).reshape(forces.moment.shape) + forces.moment
+                np.testing.assert_allclose((sign[:, None] * moment).sum(axis=0), [history[f"moment_{axis}:{name}"][step - 1] for axis in names],
+                                           rtol=0, atol=2e-4 * whole)
 
     def test_piston_that_moves_at_the_start(self):
         """A piston with a velocity at the start is slowed down by its force, and meets a grain that stops it: both go on together."""

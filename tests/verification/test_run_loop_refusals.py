@@ -150,6 +150,7 @@ try:
     s.step()
 except gravier.SimulationError as error:
     assert str(error) == "this simulation is closed; expected one that is open"
+assert (s.made, s.rank, s.ranks) == (60, 0, 1), (s.made, s.rank, s.ranks)
 """
         groups = merged(HEAP, {"boundary": HEAP["boundary"] + BOUNDARIES, "scene": {"gravity_table": None}})
         self.play("wrong", groups, script)

@@ -8,35 +8,23 @@ from .results import ResultsError
 PROGRAM = "gravier.write_bodies"
 
 
-def axes_of_contacts(normal):
-    """The tangents t, and in 3D s, of unit normals (n, d), as modules/contact/local/find_frame.fypi makes them: (n, d) each."""
-    if normal.shape[1] == 2:
-        return [np.stack([-normal[:, 1], normal[:, 0]], axis=1)]
-    x, y, z = normal.T
-    side = np.copysign(1.0, z)
-    a = -1.0 / (side + z)
-    b = x * y * a
-    return [np.stack([1.0 + side * x * x * a, side * b, -side * x], axis=1), np.stack([b, side + y * y * a, -y], axis=1)]
-
-
 def given_contacts(run, step=None):
     """Contacts of a state with their forces, as the group /contacts of a bodies file has them: (datasets by name, names of boundaries).
     Forces are impulses over the time step."""
     bodies, contacts, boundaries = run.bodies(step), run._contacts_or_error(step), run.boundaries(step)
-    axes = [contacts.normal, *axes_of_contacts(contacts.normal)]
-    force = sum(part[:, None] * axis for part, axis in zip(contacts.impulse.T, axes)) / run.time_step()
+    forces = run.forces(step)
     known = np.isin(contacts.antagonist, bodies.id)
     place = {number: -1 - k for k, number in enumerate(boundaries.id)}
     antagonist = np.array([other if body else place[other] for other, body in zip(contacts.antagonist, known)], dtype=np.int64)
+    # the bodies of the file are where they are at the end of the step
     rows, _ = run._rows(bodies, contacts)
     point = contacts.point if "point" in contacts else \
         bodies.position[rows] - (bodies.radius[rows] + 0.5 * contacts.gap)[:, None] * contacts.normal
-    found = {"candidate": contacts.candidate, "antagonist": antagonist, "normal": contacts.normal, "force": force, "point": point}
-    if "moment" in contacts:
-        moment = np.reshape(contacts.moment, (len(antagonist), -1))
-        found["moment"] = (moment if run.dimension == 2 else sum(part[:, None] * axis for part, axis in zip(moment.T, axes))) / run.time_step()
+    found = {"candidate": contacts.candidate, "antagonist": antagonist, "normal": contacts.normal, "force": forces.force, "point": point}
+    if "moment" in forces:
+        found["moment"] = forces.moment
     # what bears nothing starts from nothing
-    bears = np.any(force != 0.0, axis=1)
+    bears = np.any(forces.force != 0.0, axis=1)
     return {name: values[bears] for name, values in found.items()}, list(boundaries.name)
 
 

@@ -54,6 +54,22 @@ def _opened(path, kind):
         raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
 
 
+def tangents(normal):
+    """The tangents t, and in 3D s, of unit normals (n, d), as modules/contact/local/find_frame.fypi makes them: (n, d) each."""
+    if normal.shape[1] == 2:
+        return [np.stack([-normal[:, 1], normal[:, 0]], axis=1)]
+    x, y, z = normal.T
+    side = np.copysign(1.0, z)
+    a = -1.0 / (side + z)
+    b = x * y * a
+    return [np.stack([1.0 + side * x * x * a, side * b, -side * x], axis=1), np.stack([b, side + y * y * a, -y], axis=1)]
+
+
+def along(parts, axes):
+    """Vectors in global axes (n, d) of their parts (n, k) along as many axes (n, d) each. A moment in space has its parts along n, t, s."""
+    return sum(part[:, None] * axis for part, axis in zip(parts.T, axes))
+
+
 def read_table(path, columns=()):
     """A CSV file with one row of names: numbers by column. `columns` are those that it must have."""
     try:
@@ -204,6 +220,24 @@ class Run:
         """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s] and, where bodies have shapes, point (n, d), the place
         of the contact; None where none are written."""
         return self._group(step, "contacts")
+
+    def forces(self, step=None):
+        """The force of each contact on its candidate in global axes: candidate, antagonist, force (n, d) [N], point (n, d) [m] half-way between
+        the surfaces in the middle of the step, where it acts, and, with rolling or pivoting friction, moment (n, 1 or 3) [N m]."""
+        bodies, contacts = self.bodies(step), self._contacts_or_error(step)
+        axes = [contacts.normal, *tangents(contacts.normal)]
+        found = {"candidate": contacts.candidate, "antagonist": contacts.antagonist, "force": along(contacts.impulse, axes) / self.time_step()}
+        if "point" in contacts:
+            found["point"] = contacts.point
+        else:
+            # the velocity of the end of the step leads to its place from that in the middle
+            row, _ = self._rows(bodies, contacts)
+            way = float(self.case.get("time", [{}])[0].get("theta", 0.5)) * self.time_step() * bodies.velocity[row]
+            found["point"] = bodies.position[row] - way - (bodies.radius[row] + 0.5 * contacts.gap)[:, None] * contacts.normal
+        if "moment" in contacts:
+            moment = np.reshape(contacts.moment, (len(contacts), 2 * self.dimension - 3))
+            found["moment"] = (moment if self.dimension == 2 else along(moment, axes)) / self.time_step()
+        return Table(found)
 
     def shapes(self):
         """Shapes of the bodies, a list: number k of a body is its item k - 1; empty where all are disks or spheres."""

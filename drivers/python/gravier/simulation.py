@@ -289,13 +289,15 @@ class Simulation:
     array `force` [N]; `communicator` is one of mpi4py. All ranks of it make the same calls."""
 
     # a name that is misspelt is refused
-    __slots__ = ("mark", "status", "dimension", "subdomains", "bodies", "boundaries", "_handle", "__weakref__")
+    __slots__ = ("mark", "status", "dimension", "rank", "ranks", "_made", "subdomains", "bodies", "boundaries", "_handle", "__weakref__")
 
     def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None):
         #: counts steps: arrays of bodies are of one of them
         self.mark = 0
         #: exit status of the program for such a run, once it is closed
         self.status = None
+        #: rank of this process, from 0, and number of ranks
+        self.rank, self.ranks = 0, 1
         self._handle = ctypes.c_void_p()
         options = RESTART * bool(restart) + QUIET * bool(quiet) + FORCES * bool(forces)
         number = None if communicator is None else ctypes.pointer(ctypes.c_int(communicator.py2f()))
@@ -304,7 +306,7 @@ class Simulation:
         call("open", os.fsencode(case), command, options, number, ctypes.byref(self._handle))
         # a script that ends without close
         atexit.register(self.close)
-        self.dimension = self.whole("dimension")
+        self.dimension, self.rank, self.ranks = self.whole("dimension"), self.whole("rank"), self.whole("ranks")
         #: bodies by subdomain of this rank, bodies of this rank, boundaries by name
         self.subdomains = [Subdomain(self, k) for k in range(self.whole("subdomains"))]
         d = self.dimension
@@ -368,6 +370,7 @@ class Simulation:
         if self._handle is None:
             return self.status
         atexit.unregister(self.close)
+        self._made = self.made
         handle, self._handle = self._handle, None
         self.mark += 1
         self.status = load().gravier_close(handle)
@@ -377,12 +380,10 @@ class Simulation:
         return self.status
 
     goes_on = property(lambda self: bool(self.whole("goes_on")), doc="there is a step to make")
-    made = property(lambda self: self.whole("step"), doc="steps made so far")
+    made = property(lambda self: self._made if self._handle is None else self.whole("step"), doc="steps made so far")
     steps = property(lambda self: self.whole("steps"), doc="steps of the case")
     time = property(lambda self: self.real("time"), doc="[s]")
     time_step = property(lambda self: self.real("time_step"), doc="[s]")
-    rank = property(lambda self: self.whole("rank"), doc="of this process, from 0")
-    ranks = property(lambda self: self.whole("ranks"), doc="number of ranks")
     restarted = property(lambda self: bool(self.whole("restarted")), doc="the run goes on from a checkpoint")
     converged = property(lambda self: bool(self.whole("converged")), doc="the solve of the last step has reached its goal")
     iterations = property(lambda self: self.whole("iterations"), doc="of the last step")

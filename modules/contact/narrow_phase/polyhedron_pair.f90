@@ -200,9 +200,10 @@ contains
       corner(3) = dot_product(x, normal)
       ! most vertices are far from the plane
       if (.not. corner(3) + distance - radius*a%rounding < alert) cycle
-      if (.not. is_lowest(a, k, normal, vertex(1:m))) cycle
+      if (shares_some_corner(a, k, vertex(1:m))) cycle
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
+      ! of points with one key the deepest counts
       call add_point(point_of(first_of_corner(a, k), corner), alert, radius, n, point)
     end do
     do k = 1, m
@@ -230,27 +231,17 @@ contains
 
   end subroutine find_halfspace_manifold
 
-  !> Whether a vertex is the lowest of its corner, of several the first, and the corner is none of those taken.
-  pure logical function is_lowest(a, v, up, taken)
+  !> Whether the corner of a vertex is that of one of some others.
+  pure logical function shares_some_corner(a, v, others) result(shares)
     type(convex_piece_t), intent(in) :: a
-    integer, intent(in) :: v
-    !> unit vector, in the axes of the piece
-    real(dp), intent(in) :: up(3)
-    !> vertices
-    integer, intent(in) :: taken(:)
-    real(dp) :: above
-    integer :: w
+    integer, intent(in) :: v, others(:)
+    integer :: k
 
-    is_lowest = .false.
-    do w = 1, size(taken)
-      if (shares_corner(a, v, taken(w))) return
+    shares = .true.
+    do k = 1, size(others)
+      if (shares_corner(a, v, others(k))) return
     end do
-    do w = first_of_corner(a, v), size(a%vertex, 2)
-      if (.not. shares_corner(a, v, w)) exit
-      above = dot_product(a%vertex(:, w) - a%vertex(:, v), up)
-      if (above < 0.0_dp .or. (w < v .and. above <= 0.0_dp)) return
-    end do
-    is_lowest = .true.
-  end function is_lowest
+    shares = .false.
+  end function shares_some_corner
 
 end module gravier_polyhedron_pair

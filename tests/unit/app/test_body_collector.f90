@@ -112,7 +112,7 @@ contains
   subroutine test_grains()
     type(simulation_t) :: simulation
     type(field_list_t) :: table
-    type(field_t) :: radius, mass, material, position, velocity
+    type(field_t) :: radius, mass, material, position, velocity, boundary
     integer :: k
 
     call make_disks("friction = 0.5, gravity = 0, 0", boundaries_2d, simulation)
@@ -130,6 +130,11 @@ contains
     velocity = field_of(table, "velocity", "m/s, rad/s")
     call check_equal(table%place("image"), 0, "no image without a period")
     call check_equal(table%place("glued"), 0, "what is not for files is not there")
+    boundary = field_of(table, "boundary", "")
+    call check_equal(boundary%whole(1, item_of(table, 40)), 0_i8, "a free grain is of no boundary")
+    do k = 5, 99, 94
+      call check_equal(boundary%whole(1, item_of(table, k)), simulation%decomposition%boundaries(4)%id, "a glued grain")
+    end do
     k = item_of(table, 40)
     call check_vector(position%value(:, k), [0.0_dp, 0.0_dp], "place of grain 40")
     call check_vector(velocity%value(:, k), [1.0_dp, 2.0_dp, 3.0_dp], "velocity of grain 40")

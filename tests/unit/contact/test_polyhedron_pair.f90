@@ -444,7 +444,7 @@ contains
       call check(count(abs(spike%size*piece%corner(3, :) - apex%x(3)) < tight) > 2, "spike: several vertices in its apex")
     end associate
     do k = 0, 24
-      turn = about(vec(cos(0.26_dp*k), sin(0.26_dp*k), 0.0_dp), 0.05_dp*mod(k, 5))
+      turn = about(vec(cos(0.26_dp*k), sin(0.26_dp*k), 0.0_dp), 0.18_dp*mod(k, 5))
       up = back(turn, vec(0.0_dp, 0.0_dp, 1.0_dp))
       height = -dot_product(apex%x, up%x)
       call lie(spike, up, height - 0.15_dp, manifold)
