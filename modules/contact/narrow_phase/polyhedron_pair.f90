@@ -5,7 +5,7 @@
 !> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, find_support, shares_corner, first_of_corner
+  use gravier_convex_piece, only: convex_piece_t, find_support, first_of_corner
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
   use gravier_core_overlap, only: find_least_separation
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
@@ -200,11 +200,10 @@ contains
       corner(3) = dot_product(x, normal)
       ! most vertices are far from the plane
       if (.not. corner(3) + distance - radius*a%rounding < alert) cycle
-      if (shares_some_corner(a, k, vertex(1:m))) cycle
+      if (any(vertex(1:m) == k)) cycle
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
-      ! of points with one key the deepest counts
-      call add_point(point_of(first_of_corner(a, k), corner), alert, radius, n, point)
+      call add_point(point_of(k, corner), alert, radius, n, point)
     end do
     do k = 1, m
       call add_point(point_of(vertex(k), place(:, k)), alert, radius, n, point)
@@ -226,22 +225,10 @@ contains
       new%gap = corner(3) + distance - radius*a%rounding
       new%place(1:2) = corner(1:2)
       new%place(3) = -distance + 0.5_dp*new%gap
-      new%key = (v - 1)*feature_base
+      ! of points with one key the deepest counts
+      new%key = (first_of_corner(a, v) - 1)*feature_base
     end function point_of
 
   end subroutine find_halfspace_manifold
-
-  !> Whether the corner of a vertex is that of one of some others.
-  pure logical function shares_some_corner(a, v, others) result(shares)
-    type(convex_piece_t), intent(in) :: a
-    integer, intent(in) :: v, others(:)
-    integer :: k
-
-    shares = .true.
-    do k = 1, size(others)
-      if (shares_corner(a, v, others(k))) return
-    end do
-    shares = .false.
-  end function shares_some_corner
 
 end module gravier_polyhedron_pair
