@@ -4,11 +4,12 @@ module gravier_config_check_boundary
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_surface, only: surface_t
-  use gravier_surface_registry, only: glued_grains
+  use gravier_surface_registry, only: glued_grains, wall_of_bodies
   use gravier_given_contacts, only: name_length
   use gravier_boundary_forces, only: name_in_columns
   use gravier_contact_coefficients, only: coefficients_t
   use gravier_config_types, only: config_t, boundary_config_t, text_length
+  use gravier_wall_side, only: wall_side_t, wall_side_of
   use gravier_config_surfaces, only: set_surface, surface_value, shapes_in
   use gravier_config_keys, only: choices_text, has_word
   use gravier_config_report, only: report_t, expect, expect_own_name, miss, is_given, shown_text, ordinal
@@ -42,9 +43,10 @@ contains
       call check_columns(report, names(:i), columns(:i), error)
       call check_group(report, config%boundaries(:i), error)
       call check_shape(report, config, config%boundaries(i), error)
+      call check_wall(report, config, i, error)
       call check_size(report, config%boundaries(i), error)
       call check_free(report, config%boundaries(i), error)
-      call check_loads(report, config%boundaries(i), error)
+      call check_loads(report, config%scene%dimension, config%boundaries(i), error)
       call check_contact(report, config%scene%dimension, config%boundaries(i)%contact, "boundary", "", error)
       call expect(report, config%boundaries(i)%remove_at >= 0.0_dp, "boundary", "remove_at", error)
       if (allocated(error)) return
@@ -98,6 +100,30 @@ contains
                 "another shape where bodies = '"//trim(config%scene%bodies)//"': the groups of grains come from a bodies file")
   end subroutine check_shape
 
+  !> A wall of the bodies is named, and no other boundary is this wall.
+  subroutine check_wall(report, config, i, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    !> number of the boundary
+    integer, intent(in) :: i
+    type(error_t), allocatable, intent(inout) :: error
+    type(wall_side_t) :: side
+    integer :: k
+
+    associate (boundary => config%boundaries(i))
+      if (boundary%shape /= wall_of_bodies .or. allocated(error)) return
+      call expect(report, config%scene%bodies /= "none", "boundary", "shape", error, &
+                  "another shape where bodies = 'none': no walls come with the bodies")
+      side = wall_side_of(boundary%wall, config%scene%dimension)
+      call expect(report, side%axis > 0 .or. side%id > 0, "boundary", "wall", error, &
+                  "a side, such as '+x' or '-y', or the identifier of a wall")
+      do k = 1, i - 1
+        if (config%boundaries(k)%shape == wall_of_bodies .and. config%boundaries(k)%wall == boundary%wall) call expect(report, &
+          & .false., "boundary", "wall", error, "a wall of its own, but the "//ordinal(k)//" has it too")
+      end do
+    end associate
+  end subroutine check_wall
+
   !> Where it is and how large.
   subroutine check_size(report, boundary, error)
     type(report_t), intent(in) :: report
@@ -139,15 +165,23 @@ contains
   end subroutine check_free
 
   !> Loads without effect: on what is not free.
-  subroutine check_loads(report, boundary, error)
+  subroutine check_loads(report, dimension, boundary, error)
     type(report_t), intent(in) :: report
+    integer, intent(in) :: dimension
     type(boundary_config_t), intent(in) :: boundary
     type(error_t), allocatable, intent(inout) :: error
+    type(wall_side_t) :: side
     real(dp) :: normal(3)
 
     call expect(report, all(boundary%free .or. abs(boundary%force) <= 0.0_dp), "boundary", "force", error, &
                 "0 along each component that is not free")
     normal = surface_value(boundary, "normal")
+    if (boundary%shape == wall_of_bodies) then
+      ! that of an identifier comes with the bodies
+      side = wall_side_of(boundary%wall, dimension)
+      normal(:) = merge(1.0_dp, 0.0_dp, side%axis == 0)
+      if (side%axis > 0) normal(side%axis) = 1.0_dp
+    end if
     call expect(report, any(abs(normal) > 0.0_dp .and. boundary%free) .or. abs(boundary%pressure) <= 0.0_dp, "boundary", &
                 "pressure", error, "0 where no component along normal is free")
   end subroutine check_loads

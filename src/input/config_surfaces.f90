@@ -3,7 +3,7 @@ module gravier_config_surfaces
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
   use gravier_surface, only: surface_t, surface_features_t
-  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, make_surface, glued_grains
+  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, make_surface, glued_grains, wall_of_bodies
   use gravier_config_types, only: boundary_config_t
   use gravier_config_table, only: surface_rows
   implicit none
@@ -12,8 +12,8 @@ module gravier_config_surfaces
 
 contains
 
-  !> The surface that a group asks for, not allocated for glued grains. Where a value cannot be, `wrong` names its key and
-  !> `expected` says what was expected; blank: what the rule of the key says.
+  !> The surface that a group asks for, not allocated for glued grains and walls of the bodies. Where a value cannot be, `wrong`
+  !> names its key and `expected` says what was expected; blank: what the rule of the key says.
   subroutine set_surface(config, surface, wrong, expected)
     type(boundary_config_t), intent(in) :: config
     class(surface_t), allocatable, intent(out) :: surface
@@ -57,7 +57,7 @@ contains
       features = surfaces(k)%surface%features()
       if (features%dimensions(dimension)) words = words//trim(features%kind)//" "
     end do
-    words = words//glued_grains
+    words = words//glued_grains//" "//wall_of_bodies
   end function shapes_in
 
 end module gravier_config_surfaces

@@ -7,7 +7,7 @@ module gravier_config_table
   use gravier_config_table_grains, only: made_keys, source_keys, prepared_keys, where_keys, material_keys
   use gravier_law_registry, only: collect_law_keys => law_keys
   use gravier_surface, only: surface_features_t
-  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains
+  use gravier_surface_registry, only: surface_holder_t, registered_surfaces, surface_keys, glued_grains, wall_of_bodies
   use gravier_method_options, only: method_features_t
   use gravier_method_registry, only: method_holder_t, registered_methods, method_words, quoted_names, all_methods, that_relax, &
     & accelerated, accelerated_on_active
@@ -135,7 +135,8 @@ module gravier_config_table
            note="`'boundary K'`, K its number"), &
      key_t("boundary", "shape", kind_choice, "''", "", &
            "what it is: `segment` and `circle` in 2D, `rectangle` and `cylinder` in 3D only; `mesh`: facets of a file; "// &
-           "`grains`: glued grains of the bodies file; `outlet`: a plane behind which grains leave the scene", &
+           "`grains`: glued grains of the bodies file; `wall`: a plane that comes with the bodies; "// &
+           "`outlet`: a plane behind which grains leave the scene", &
            note="required", required=.true.)]
 
   type(key_t), parameter :: boundary_keys(*) = &
@@ -145,6 +146,9 @@ module gravier_config_table
            "path of the facets of a mesh: an STL or OBJ file of triangles or polygons in 3D, an OBJ file of lines or a CSV "// &
            "file of the points `x,y` of one line in 2D; see [mesh walls](user_guide.md#mesh-walls)", &
            note="required", chooser="shape", chosen=faceted_shapes), &
+     key_t("boundary", "wall", kind_text, "''", "not empty", &
+           "the wall of the bodies that it is: `'-x'`, `'+x'`, `'-y'`, ... by the side on which it lies, or the identifier of "// &
+           "a wall of the bodies file", note="required", chooser="shape", chosen=wall_of_bodies), &
      key_t("boundary", "velocity", kind_real, "3*0", "", &
            "prescribed velocity, of `free` components that at the start; its third component is 0 in 2D", &
            count=3, unit="m/s"), &
@@ -161,7 +165,7 @@ module gravier_config_table
      key_t("boundary", "pressure", kind_real, "0", "", &
            "pressure along `normal`, which lies along an axis with a free component; the area is the distance of two planes "// &
            "that face each other along each other axis and stay, or the period", &
-           unit="Pa, N/m in 2D", chooser="shape", chosen="plane"), &
+           unit="Pa, N/m in 2D", chooser="shape", chosen="plane "//wall_of_bodies), &
      key_t("boundary", "mass", kind_real, "0", "> 0", "inertia of a boundary that has free components; only there", &
            unit="kg", note="required where a component is `free`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "table", kind_text, "''", "", &
@@ -411,8 +415,8 @@ contains
     end do
     do k = 1, size(keys)
       if (keys(k)%group /= "boundary") cycle
-      if (keys(k)%name == "shape") keys(k)%allowed = trim(surface_rows%kinds)//" "//glued_grains
-      if (keys(k)%chosen == solid_shapes) keys(k)%chosen = trim(solid)//" "//glued_grains
+      if (keys(k)%name == "shape") keys(k)%allowed = trim(surface_rows%kinds)//" "//glued_grains//" "//wall_of_bodies
+      if (keys(k)%chosen == solid_shapes) keys(k)%chosen = trim(solid)//" "//glued_grains//" "//wall_of_bodies
       if (keys(k)%chosen == faceted_shapes) keys(k)%chosen = faceted
     end do
   end subroutine complete_boundary_keys

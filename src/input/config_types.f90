@@ -198,7 +198,7 @@ module gravier_config_types
   type :: boundary_config_t
     !> unique; 'boundary K', K its number, when not given
     character(len=text_length) :: name
-    !> word of a registered shape, or grains
+    !> word of a registered shape, grains or wall
     character(len=choice_length) :: shape
     !> (3, keys of all shapes): of the keys of gravier_surface_registry, in their order; of one with a single value the first
     real(dp), allocatable :: value(:, :)
@@ -206,11 +206,13 @@ module gravier_config_types
     integer :: group
     !> mesh: the file of its facets; blank for other shapes
     character(len=text_length) :: file
+    !> wall: which of the walls of the bodies, as gravier_wall_side reads it; blank for other shapes
+    character(len=text_length) :: wall
     !> m/s
     real(dp) :: velocity(3)
     !> rad/s; in 2D the first entry is the rate about z and the others are 0
     real(dp) :: rotation(3)
-    !> m: the point it turns about; the value of point when not given (0 for grains)
+    !> m: the point it turns about; the value of point when not given (0 for grains and walls)
     real(dp) :: pivot(3)
     logical :: pivot_given = .false.
     !> components of the translation that forces move

@@ -5,54 +5,62 @@ module gravier_scene_boundaries
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t
-  use gravier_surface_registry, only: make_surface
+  use gravier_given_contacts, only: name_length
+  use gravier_surface_registry, only: make_surface, wall_of_bodies
   use gravier_mesh_file, only: read_mesh
   use gravier_boundary, only: boundary_t, drive_names
   use gravier_facing_planes, only: faces_along, open_axis, is_pressed
   use gravier_config_types, only: config_t, boundary_config_t
+  use gravier_wall_side, only: wall_side_t, wall_side_of
   use gravier_config_surfaces, only: set_surface
   use gravier_config_laws, only: material_number
   implicit none
   private
   public :: make_boundaries, check_pressures, check_pressed
 
+  !> cosine of the angle to an axis within which the normal of a wall lies along it
+  real(dp), parameter :: along_axis = 0.999_dp
+
 contains
 
-  !> Walls first, then the groups of the input file, with the identifiers that follow on the largest of `data`. Errors
-  !> are the same on all ranks. Collective.
+  !> Walls first, then the groups of the input file, with the identifiers that follow on the largest of `data`. A wall that a group
+  !> names is a boundary of this group: it is none of `data` any more, keeps its identifier, and contacts of `data` know it by its
+  !> new name. Errors are the same on all ranks. Collective.
   subroutine make_boundaries(comm, config, data, boundaries, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
-    type(bodies_data_t), intent(in) :: data
+    type(bodies_data_t), intent(inout) :: data
     type(boundary_t), allocatable, intent(out) :: boundaries(:)
     type(error_t), allocatable, intent(inout) :: error
+    type(boundary_t) :: taken(size(config%boundaries))
     integer(i8) :: last_id
     integer :: w, b, nd
 
-    call check_wall_names(config, data, error)
-    if (allocated(error)) return
     nd = config%scene%dimension
-    allocate (boundaries(data%n_walls + size(config%boundaries)))
-    do w = 1, data%n_walls
-      associate (wall => boundaries(w))
-        wall%id = data%wall_id(w)
-        wall%name = wall_name(data%wall_id(w))
-        call make_surface("plane", wall%surface)
-        wall%surface%point(1:nd) = data%wall_point(:, w)
-        wall%pivot(:) = wall%surface%point
-        wall%surface%axis(1:nd) = data%wall_normal(:, w)
-        wall%contact = config%scene%wall_contact
-        wall%material = material_number(config, config%scene%wall_material)
-      end associate
-    end do
     last_id = 0
     if (data%n > 0) last_id = maxval(data%id)
     if (data%n_walls > 0) last_id = max(last_id, maxval(data%wall_id))
     last_id = comm%largest(last_id)
+    call take_walls(config, data, taken, error)
+    call check_wall_names(config, data, error)
+    if (allocated(error)) return
+    allocate (boundaries(data%n_walls + size(config%boundaries)))
+    do w = 1, data%n_walls
+      associate (wall => boundaries(w))
+        call make_wall(data, w, wall)
+        wall%contact = config%scene%wall_contact
+        wall%material = material_number(config, config%scene%wall_material)
+      end associate
+    end do
     do b = 1, size(config%boundaries)
       associate (boundary => boundaries(data%n_walls + b))
         boundary%id = last_id + b
         call set_boundary(config%boundaries(b), nd, boundary)
+        if (allocated(taken(b)%surface)) then
+          boundary%id = taken(b)%id
+          call move_alloc(taken(b)%surface, boundary%surface)
+          if (.not. config%boundaries(b)%pivot_given) boundary%pivot(:) = taken(b)%pivot
+        end if
         boundary%material = material_number(config, config%boundaries(b)%material)
         if (boundary%is_faceted()) call read_facets(trim(config%boundaries(b)%file), nd, boundary, error)
         if (config%boundaries(b)%table /= "") call boundary%table%read(trim(config%boundaries(b)%table), drive_names(nd), error)
@@ -66,6 +74,119 @@ contains
       if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
+
+  !> A plane of the bodies.
+  subroutine make_wall(data, w, wall)
+    type(bodies_data_t), intent(in) :: data
+    integer, intent(in) :: w
+    type(boundary_t), intent(inout) :: wall
+
+    wall%id = data%wall_id(w)
+    wall%name = wall_name(data%wall_id(w))
+    call make_surface("plane", wall%surface)
+    wall%surface%point(1:data%dimension) = data%wall_point(:, w)
+    wall%pivot(:) = wall%surface%point
+    wall%surface%axis(1:data%dimension) = data%wall_normal(:, w)
+  end subroutine make_wall
+
+  !> Take the walls that groups name out of the bodies.
+  subroutine take_walls(config, data, taken, error)
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(inout) :: data
+    !> those that groups are, the others without a surface (groups)
+    type(boundary_t), intent(inout) :: taken(:)
+    type(error_t), allocatable, intent(inout) :: error
+    logical :: left(data%n_walls)
+    integer :: b, w, k
+
+    left(:) = .true.
+    do b = 1, size(taken)
+      if (config%boundaries(b)%shape /= wall_of_bodies) cycle
+      call find_wall(config, b, data, w, error)
+      if (allocated(error)) return
+      if (.not. left(w)) then
+        call raise(error, status_input, config%file//": &boundary '"//trim(config%boundaries(b)%name)//"' wall = '"// &
+          & trim(config%boundaries(b)%wall)//"': expected a wall of its own, but another boundary is the wall "// &
+          & to_text(data%wall_id(w))//", too")
+        return
+      end if
+      left(w) = .false.
+      call make_wall(data, w, taken(b))
+      if (.not. allocated(data%contacts%boundary)) cycle
+      do k = 1, size(data%contacts%boundary)
+        if (data%contacts%boundary(k) == taken(b)%name) data%contacts%boundary(k) = config%boundaries(b)%name(:name_length)
+      end do
+    end do
+    if (.not. all(left)) call keep_walls(left, data)
+  end subroutine take_walls
+
+  !> Leave some walls of the bodies out.
+  subroutine keep_walls(kept, data)
+    logical, intent(in) :: kept(:)
+    type(bodies_data_t), intent(inout) :: data
+    integer(i8), allocatable :: id(:)
+    real(dp), allocatable :: point(:, :), normal(:, :)
+    integer :: w, n
+
+    allocate (id(count(kept)), point(data%dimension, count(kept)), normal(data%dimension, count(kept)))
+    n = 0
+    do w = 1, size(kept)
+      if (.not. kept(w)) cycle
+      n = n + 1
+      id(n) = data%wall_id(w)
+      point(:, n) = data%wall_point(:, w)
+      normal(:, n) = data%wall_normal(:, w)
+    end do
+    data%n_walls = n
+    call move_alloc(id, data%wall_id)
+    call move_alloc(point, data%wall_point)
+    call move_alloc(normal, data%wall_normal)
+  end subroutine keep_walls
+
+  !> The wall that a group names: the one on a side, whose normal lies along the axis, or the one with an identifier.
+  subroutine find_wall(config, b, data, w, error)
+    type(config_t), intent(in) :: config
+    !> number of the group
+    integer, intent(in) :: b
+    type(bodies_data_t), intent(in) :: data
+    integer, intent(out) :: w
+    type(error_t), allocatable, intent(inout) :: error
+    type(wall_side_t) :: side
+    character(len=:), allocatable :: walls
+    integer :: k, found
+
+    side = wall_side_of(config%boundaries(b)%wall, data%dimension)
+    w = 0
+    found = 0
+    walls = ""
+    do k = 1, data%n_walls
+      walls = walls//trim(merge(",", " ", k > 1))//" "//to_text(data%wall_id(k))//side_text(data%wall_normal(:, k))
+      if (side%axis > 0) then
+        if (-side%sign*data%wall_normal(side%axis, k) < along_axis) cycle
+      else if (data%wall_id(k) /= side%id) then
+        cycle
+      end if
+      found = found + 1
+      w = k
+    end do
+    if (found == 1) return
+    if (walls == "") walls = " none"
+    call raise(error, status_input, config%file//": &boundary '"//trim(config%boundaries(b)%name)//"' wall = '"// &
+      & trim(config%boundaries(b)%wall)//"': "//to_text(found)//" walls of the bodies are meant; expected one of"//walls)
+  end subroutine find_wall
+
+  !> The side of a wall with a normal towards the free side, in parentheses; nothing of one that leans.
+  pure function side_text(normal) result(text)
+    real(dp), intent(in) :: normal(:)
+    character(len=:), allocatable :: text
+    character(len=*), parameter :: axes = "xyz"
+    integer :: d
+
+    text = ""
+    do d = 1, size(normal)
+      if (abs(normal(d)) >= along_axis) text = " ("//merge("-", "+", normal(d) > 0.0_dp)//axes(d:d)//")"
+    end do
+  end function side_text
 
   !> The name of a wall of a bodies file, a lattice or a sample.
   pure function wall_name(id) result(name)

@@ -186,6 +186,21 @@ FILES = [
          "no rotation but about its axis"),
         ("belt that turns", {"shape": "plane", "normal": [0.0, 0.0, 1.0], "rotation": [0.0, 0.0, 1.0]}, "no rotation but about"),
       )),
+    # walls of the bodies
+    *((f"wall {title}", case({"boundary": boundary}), words) for title, boundary, words in (
+        ("without a name", {"shape": "wall"}, ("wall is missing", "required by shape = 'wall'")),
+        ("of no side", {"shape": "wall", "wall": "+z"}, ("wall = '+z': expected a side, such as '+x' or '-y', or the identifier of a wall",)),
+        ("with a point", {"shape": "wall", "wall": "-x", "point": [0.0, 0.0]}, ("point", "shape = 'wall'")),
+        ("that is not there", {"shape": "wall", "wall": "7777"}, ("boundary 'boundary 1' wall = '7777': 0 walls of the bodies are meant; expected one of", "(-x)")),
+        ("taken twice by its side and its identifier", [{"shape": "wall", "wall": "-x"}, {"shape": "wall", "wall": "32"}],
+         ("expected a wall of its own, but another boundary is the wall 32, too",)),
+        ("taken twice", [{"shape": "wall", "wall": "-x"}, {"shape": "wall", "wall": "-x"}], ("a wall of its own, but the 1st has it too",)),
+        ("pressed across", {"shape": "wall", "wall": "-x", "free": [False, True], "mass": 1.0, "pressure": 1.0},
+         ("0 where no component along normal is free",)))),
+    ("wall of no bodies", case({"scene": {"bodies": "none", "lattice_count": None, "radius_min": None, "radius_max": None},
+                                "boundary": {"shape": "wall", "wall": "-x"},
+                                "insertion": {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "rate": 1.0, "radius": 0.1}}),
+     ("another shape where bodies = 'none'",)),
     # the magnitude
     key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
     key("time", "step", "1e31", "expected a number of at most 1e30 in size"),

@@ -238,6 +238,43 @@ class GivenForces(RunTestCase):
                 self.assert_status(again, 0)
                 self.assertIn(f"{len(tables[0])} of its {len(tables[0])} contacts touch", again.stdout)
 
+    def test_walls_that_a_case_takes(self):
+        """Walls of a sample that a case takes by their sides or their identifiers, as they are: the same bits as without, with their
+        identifiers, their forces and the names of the case; a wall may be driven, and one removed at the start is gone."""
+        path, _ = self.settle()
+        with h5py.File(path) as file:
+            walls = {tuple(normal): int(number) for number, normal in zip(file["walls/id"][:], file["walls/normal"][:])}
+        left, right, floor = walls[1.0, 0.0], walls[-1.0, 0.0], walls[0.0, 1.0]
+        scene = {"scene": {"dimension": 2, "friction": 0.3, "alert_distance": 0.003}, "time": {"steps": 20}, "output": {"checkpoint_every": 10}}
+        plain = self.start("plain", scene, path)
+        self.assert_status(plain, 0)
+        taken = {"boundary": [{"name": "ground", "shape": "wall", "wall": "-y"}, {"name": "right", "shape": "wall", "wall": str(right)}]}
+        run = self.start("taken", merged(scene, taken), path)
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"start       from forces of the bodies file: (\d+) of its \1 contacts touch in the first step, with 100.0 %")
+        for step in (1, 20):
+            for name in ("bodies/position", "bodies/velocity", "contacts/impulse", "contacts/antagonist"):
+                np.testing.assert_array_equal(run.results()[f"/steps/{step}/{name}"], plain.results()[f"/steps/{step}/{name}"], f"{step} {name}")
+        rows = package.Run(run.path("results")).boundaries()
+        self.assertEqual(dict(zip(rows.name, rows.id)), {f"wall {left}": left, "ground": floor, "right": right})
+        self.assertEqual(list(rows.shape), ["plane"] * 3)
+        np.testing.assert_array_equal(rows.normal[list(rows.name).index("right")], [-1.0, 0.0])
+        # driven, on another number of ranks and after a restart
+        driven = {"boundary": [{"name": "ground", "shape": "wall", "wall": "-y"},
+                               {"name": "gate", "shape": "wall", "wall": "+x", "velocity": [0.05, 0.0], "friction": 0.1},
+                               {"name": "gone", "shape": "wall", "wall": "-x", "remove_at": 0.0}]}
+        runs = [self.start(f"driven_{ranks}", merged(scene, driven, {"time": {"steps": steps}}), path, ranks) for ranks, steps in ((1, 20), (2, 10))]
+        runs[1] = self.start("driven_2", merged(scene, driven), path, 1, ["--restart"])
+        for one in runs:
+            self.assert_status(one, 0)
+        for name in ("bodies/position", "bodies/velocity", "contacts/impulse", "boundaries/force"):
+            np.testing.assert_array_equal(*(one.results()[f"/steps/20/{name}"] for one in runs))
+        results, rows = runs[0].results(), package.Run(runs[0].path("results")).boundaries()
+        place = {name: rows.position[k] for k, name in enumerate(rows.name)}
+        self.assertAlmostEqual(place["gate"][0], 0.25 + 0.05 * 20 * STEP, places=12)
+        self.assertNotIn(left, results["/steps/20/contacts/antagonist"])
+        self.assertIn(floor, results["/steps/20/contacts/antagonist"])
+
     def test_no_state_of_a_cell_that_moves(self):
         """The periods of a bodies file are those of its case: a sheared cell has no such file."""
         case = {"scene": {"bodies": "lattice", "lattice_count": [4, 4], "radius_min": 0.008, "radius_max": 0.008, "period": [0.08, 0.08],

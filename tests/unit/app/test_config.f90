@@ -20,7 +20,7 @@ program test_config
   character(len=*), parameter :: positive = "expected a finite real number > 0"
   character(len=*), parameter :: third = "expected a third component of 0 where dimension = 2"
   character(len=*), parameter :: plane_keys = " shape = 'plane' normal = 0, 1 "
-  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder', 'mesh' or 'grains'"
+  character(len=*), parameter :: solid_shapes = "'plane', 'segment', 'rectangle', 'circle', 'cylinder', 'mesh', 'grains' or 'wall'"
 
   call MPI_Init()
   call test_whole_file()
@@ -993,12 +993,12 @@ contains
     call refuse(column // plane // "&boundary shap = 'plane' /", "unknown key 'shap' in &boundary; did you mean 'shape'?")
     call refuse(column // "&boundry /", "unknown group &boundry; did you mean &boundary?")
     call refuse(column // plane // "&boundary name = 'b' /", "&boundary (the 2nd, 'b') shape is missing: expected 'plane', " &
-      // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh' or 'grains'")
+      // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh', 'grains' or 'wall'")
     many = column
     do i = 1, 21
       many = many // plane
       if (i == 3) call refuse(many // "&boundary name = '' /", "&boundary (the 4th, '') shape is missing: expected 'plane', " &
-        // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh' or 'grains'")
+        // "'segment', 'rectangle', 'circle', 'cylinder', 'outlet', 'mesh', 'grains' or 'wall'")
       if (i == 10) call refuse(many // "&boundary group = a /", "&boundary (the 11th) group = a: expected an integer >= 1")
     end do
     call refuse(many // "&boundary group = a /", "&boundary (the 22nd) group = a: expected an integer >= 1")
@@ -1006,8 +1006,10 @@ contains
 
   !> Each shape in its dimension, and not in the other.
   subroutine test_shapes()
-    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'outlet', 'mesh' or 'grains' where dimension = 2"
-    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'outlet', 'mesh' or 'grains' where dimension = 3"
+    character(len=*), parameter :: in_plane = "'plane', 'segment', 'circle', 'outlet', " // &
+      & "'mesh', 'grains' or 'wall' where dimension = 2"
+    character(len=*), parameter :: in_space = "'plane', 'rectangle', 'cylinder', 'outlet', " // &
+      & "'mesh', 'grains' or 'wall' where dimension = 3"
     character(len=*), parameter :: file = "&scene bodies = 'file' bodies_file = 'a.h5' /" // time
     character(len=*), parameter :: space = "&scene bodies = 'file' bodies_file = 'a.h5' dimension = 3 /" // time
     character(len=*), parameter :: segment = "&boundary shape = 'segment' end = 1, 1 /"
@@ -1059,7 +1061,7 @@ contains
     call refuse_foreign("plane", "normal(1) = 1", "axis = 0, 1", "'cylinder'")
     call refuse_foreign("plane", "normal(1) = 1", "radius = 1", "'circle' or 'cylinder'")
     call refuse_foreign("plane", "normal(1) = 1", "group = 1", "'grains'")
-    call refuse_foreign("circle", "radius = 1", "pressure = 1", "'plane'")
+    call refuse_foreign("circle", "radius = 1", "pressure = 1", "'plane' or 'wall'")
     call refuse_foreign("outlet", "normal(1) = 1", "free = T", solid_shapes)
     call refuse_foreign("outlet", "normal(1) = 1", "force(1) = 1", solid_shapes)
     call refuse_foreign("outlet", "normal(1) = 1", "mass = 1", solid_shapes)
