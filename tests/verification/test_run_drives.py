@@ -3,9 +3,9 @@ import unittest
 
 import numpy as np
 
-import gravier
 from gravier_runs import LONG
 
+import gravier
 from small_scenes import EPS, G, INERTIA, Grain, SmallScene, floats, plane
 
 RADIUS, MASS = 0.05, 0.7
