@@ -9,6 +9,7 @@ module gravier_sample_preparation
   use gravier_solve, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_load_areas, only: facing_area
+  use gravier_scene_extent, only: find_extent
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
@@ -208,6 +209,7 @@ contains
       & fixed(solid_fraction(simulation), 4)//", contacts per grain "//fixed(contacts_per_grain(simulation), 3)// &
       & ", largest overlap "//fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii, "// &
       & to_text(simulation%step)//" steps", error)
+    call write_size(simulation, log, error)
     if (simulation%config%sample%preparation == "compacted") then
       do b = 1, simulation%n_walls
         call log%line("pressure    "//fixed(rest%pressure(b)/simulation%config%sample%pressure, 4)// &
@@ -217,6 +219,28 @@ contains
     if (rest%failed > 0) call log%line("warning     *** "//to_text(rest%failed)//" of the solves did NOT reach the tolerance", &
       & error)
   end subroutine write_summary
+
+  !> How large the sample is along each axis, also in mean diameters: a loose box that equal pressures compact may become narrow.
+  !> Collective.
+  subroutine write_size(simulation, log, error)
+    type(simulation_t), intent(in) :: simulation
+    type(run_log_t), intent(inout) :: log
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp), dimension(simulation%decomposition%nd) :: low, high, length
+    character(len=:), allocatable :: sizes, diameters
+    integer :: d
+
+    call find_extent(simulation%decomposition, low, high, length)
+    sizes = ""
+    diameters = ""
+    do d = 1, size(length)
+      if (d > 1) sizes = sizes//" x "
+      if (d > 1) diameters = diameters//" x "
+      sizes = sizes//to_text(length(d), 4)
+      diameters = diameters//fixed(0.5_dp*length(d)/simulation%decomposition%rule%mean_radius, 1)
+    end do
+    call log%line("size        "//sizes//" m, "//diameters//" mean diameters", error)
+  end subroutine write_size
 
   !> A number with so many digits after the point.
   pure function fixed(x, digits) result(text)

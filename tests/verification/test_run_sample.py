@@ -204,6 +204,9 @@ class Samples(RunTestCase):
         self.assertGreater(filled, 0.77)
         stated = float(re.search(r"solid fraction ([\d.]+)", self.runs["compacted", 1].stdout)[1])
         self.assertAlmostEqual(stated, filled, delta=1e-4)
+        wide, diameters = re.search(r"^size +(.*) m, (.*) mean diameters$", self.runs["compacted", 1].stdout, re.M).groups()
+        np.testing.assert_allclose([float(text) for text in wide.split(" x ")], size, rtol=1e-3)
+        np.testing.assert_allclose([float(text) for text in diameters.split(" x ")], size / (2 * bodies.radius.mean()), atol=0.06)
         self.check_pushed(bodies, size)
 
     def check_pushed(self, bodies, size):
