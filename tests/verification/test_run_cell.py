@@ -125,6 +125,29 @@ class Cell(RunTestCase):
         self.assertGreater(overlap, 3e-4)
         self.assertAlmostEqual(force, 1000.0 * overlap, delta=0.1 * force)
 
+    def test_memory_across_the_cell(self):
+        """Bonded pairs that drift through a cell, whose edges are straightened several times, stay bonded in any number of subdomains, and have
+        the same motion: a pair keeps its memory wherever it crosses a side of the cell or of a subdomain."""
+        for dimension, motion in ((2, {"cell_shear_rate": [2.5]}), (2, {"cell_strain_rate": [-0.3, 0.2]}), (3, {"cell_shear_rate": [2.5, -2.0, 1.7]})):
+            random = np.random.default_rng(4)
+            places = [np.array(place) for place in np.ndindex(*[4] * dimension)]
+            grains = []
+            for place in places[::2]:
+                centre = (place + 0.5) * 0.25 + random.uniform(-0.03, 0.03, dimension)
+                way = random.normal(size=dimension)
+                for sign in (-1, 1):
+                    grains.append(Grain(centre + sign * 0.02 * way / np.linalg.norm(way), random.normal(size=dimension) * 0.3, radius=0.02, mass=0.01))
+            law = {"materials": ["m"], "kind": "bonded", "bond_strength": 1e4, "bond_friction": 1.0, "bond_distance": 5e-3, "friction": 0.3}
+            found = []
+            for grid in ([1] * dimension, [2, 3, 2][:dimension]):
+                found.append(self.grains(f"bonded pairs {dimension} {next(iter(motion))} {grid}", grains, {"period": [1.0] * dimension, "wall_material": "m", **motion},
+                                         120, 120, material=[{"name": "m"}], law=[law], decomposition={"grid": grid}, solver={"method": "nscdd"},
+                                         output={"bonds": True}))
+            for one in found:
+                self.assertEqual(one["/steps/120/diagnostics@bonds"], len(grains) // 2)
+            # pairs that collide make more of what the solves differ by
+            np.testing.assert_allclose(*(one["/steps/120/bodies/position"] for one in found), rtol=0, atol=1e-4)
+
     def test_cell_without_contacts(self):
         """Stresses accelerate a cell that nothing resists: K dG/dt = -V P, and V tau for a shear."""
         grains = [Grain([0.2, 0.2], radius=0.01, mass=2.0), Grain([0.7, 0.6], radius=0.01, mass=3.0)]

@@ -415,6 +415,27 @@ class RigidLimit(ComplianceScene):
             self.verify("column of six as stiffness grows", f"distance of the velocities from the rigid ones [m/s], friction {friction}",
                         found[-1], 0, 1e-4)
 
+    def test_mirror_of_a_square_that_tips(self):
+        """A square tips from a corner onto its side, and its mirror image does: one point becomes two, and the one that stays keeps the elongation of
+        its spring in both."""
+        library = "shape square\nrounding 0.001\npolygon -0.05 -0.05  0.05 -0.05  0.05 0.05  -0.05 0.05\n"
+        ground = {"name": "ground", "shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
+        lean = np.radians(24.0)
+        place = [0.0, 0.05 * np.sqrt(2.0) * np.cos(np.pi / 4 - lean) - 3e-4]
+        found = []
+        for sign in (1.0, -1.0):
+            directory = prepare(self.here(f"tips {sign}"), 2, [body("square", place, turn=sign * lean, spin=-2.0 * sign)], library)
+            run = run_case(shaped_case(2, [ground], {
+                "scene": {"wall_material": "m", "alert_distance": 0.1}, "material": MATERIAL,
+                "law": [elastic(normal_stiffness=1e5, friction=0.5, spring_theta=0.5, spring_restitution=0.3, tangential_damping=0.5)],
+                "time": {"step": 5e-4, "steps": 120}, "solver": {"criterion": "residual", "tolerance": 1e-10},
+                "output": {"every": 120, "boundary_forces": True}}), directory=directory)
+            self.assert_status(run, 0)
+            force = run.history()["force_x:ground"]
+            self.assertGreater(np.abs(force).max(), 100.0)
+            found.append((sign * force, run.results()["/steps/120/bodies/velocity"][0] * [sign, 1.0, sign]))
+        for one, other in zip(*found):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-7 * np.abs(one).max())
 
     def test_seam(self):
         """Two squares side by side are one body with three points on a plane, whatever its tilt: the corners at the seam are one point. The body

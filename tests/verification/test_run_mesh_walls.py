@@ -266,6 +266,31 @@ class MeshWalls(RunTestCase):
             history = gravier.Run(plane.directory).history()
             self.assertLess(abs(history["kinetic_energy"][-1] / history["kinetic_energy"][0] - 1), 2e-3)
 
+    def test_rims(self):
+        """Boxes that fall half over the straight rim of a mesh move as over that of a rectangle, whatever corners the rim has and however the mesh
+        is cut, rigid and on springs, also where they are deeper than their roundings."""
+        wide = 0.4
+        corners = np.array([[0, -wide, 0], [wide, -wide, 0], [wide, wide, 0], [0, wide, 0], [0, 0.013, 0], [0, -0.2, 0]], float)
+        meshes = {"two triangles": [(0, 1, 2), (0, 2, 3)], "a corner in the rim": [(0, 1, 4), (1, 2, 4), (2, 3, 4)],
+                  "two corners in the rim": [(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)]}
+        rectangle = {"shape": "rectangle", "point": [0.0, -wide, 0.0], "edge_a": [wide, 0.0, 0.0], "edge_b": [0.0, 2 * wide, 0.0]}
+        library = "shape plank\nrounding 0.001\nbox 0.12 0.03 0.03\n"
+        law = {"materials": ["m"], "kind": "elastic", "normal_stiffness": 2e4, "spring_theta": 0.5}
+        rigid = {"scene": {"friction": 0.0, "alert_distance": 0.01}, "time": {"step": 1e-3, "steps": 70}}
+        springs = merged(rigid, {"scene": {"wall_material": "m"}, "material": [{"name": "m"}], "law": [law], "time": {"step": 5e-4, "steps": 140}})
+        for title, scene, seeds in (("rigid", rigid, (6, 12)), ("springs", springs, (6, 39))):
+            for seed in seeds:
+                random = np.random.default_rng(seed)
+                turn = random.normal(size=4)
+                place = [random.uniform(-0.03, 0.02), 0.013 + random.uniform(-0.02, 0.02), 0.09]
+                row = body("plank", place, turn=numbers(turn / np.linalg.norm(turn)), velocity=[0.0, 0.0, -1.0], spin=numbers(random.uniform(-5, 5, 3)))
+                wanted = self.play(f"{title} {seed} rectangle", 3, [row], [rectangle], scene, library=library)
+                self.assertGreater(np.abs(wanted.velocity[-1, 0] - wanted.velocity[0, 0]).max(), 1.0)
+                for name, faces in meshes.items():
+                    with self.subTest(title, seed=seed, mesh=name):
+                        found = self.play(f"{title} {seed} {name}", 3, [row], [MESH], scene, mesh=corners[np.array(faces)], library=library)
+                        np.testing.assert_allclose(found.velocity[-1, 0], wanted.velocity[-1, 0], rtol=0, atol=1e-6)
+
     def test_loads_of_a_box(self):
         """The four points of a cube at rest in the middle of a triangulated floor carry about a quarter of its weight each: balance fixes
         three sums of the four."""

@@ -6,6 +6,7 @@ module gravier_facet_contacts
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
   use gravier_core_overlap, only: find_least_separation, find_separation_by_faces
+  use gravier_facet_rims, only: extend_rims, extend_edge, is_on_wall
   use gravier_polygon_pair, only: placed_piece_t, find_polygon_manifold
   use gravier_polyhedron_pair, only: find_patch
   use gravier_flat_patch, only: make_facet_piece, set_facet_piece, lies_flat, find_flat_patch
@@ -272,6 +273,9 @@ contains
             call take_plane(near, k, radius*piece%rounding, found, n, corner)
             call find_flat_patch(piece, radius, distance(item%place), corner(:, :, 1:n), alert, most, manifold)
           else
+            associate (own => distance(item%place))
+              call extend_edge(near, item%place, own%normal, own%vertex_b(1:own%n), radius, found%sheet)
+            end associate
             call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
           end if
           call found%add(near%number(item%place), manifold)
@@ -289,6 +293,7 @@ contains
     type(core_distance_t), intent(inout) :: distance(:)
     type(facet_contacts_t), intent(inout) :: found
     type(facet_candidate_t) :: candidate
+    type(core_distance_t) :: by_faces
     real(dp) :: reach
     integer :: k
 
@@ -303,7 +308,13 @@ contains
       call make_candidate(found%sheet, k, distance(k), candidate)
       if (distance(k)%overlap .and. .not. candidate%lies_along) then
         if (is_stopped(near, candidate, tolerance_for(near, reach))) then
-          call find_separation_by_faces(piece, found%sheet, pair, distance(k))
+          call find_separation_by_faces(piece, found%sheet, pair, by_faces)
+          if (is_on_wall(near, by_faces%point_b, tolerance_for(near, reach))) then
+            distance(k) = by_faces
+          else
+            call extend_rims(near, k, pair%radius_b, found%sheet)
+            call find_least_separation(piece, found%sheet, pair, distance(k))
+          end if
           call make_candidate(found%sheet, k, distance(k), candidate)
         end if
       end if

@@ -21,6 +21,8 @@ module gravier_decomposition
     type(communicator_t), pointer :: comm => null()
     type(partition_t) :: partition
     type(period_t) :: period
+    !> the same lattice with the edges that it had before the last migration, of which shifts in older lists are
+    type(period_t) :: older_period
     type(neighbour_rule_t) :: rule
     integer :: n_subdomains = 1
     !> space dimension, degrees of freedom of a body, entries of an image, of an orientation, of its rest and of an applied force
@@ -165,6 +167,7 @@ contains
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer :: k, s, turns(3)
 
+    self%older_period = self%period
     call self%period%straighten(turns)
     if (self%ni > 0) then
       do s = 1, size(self%owned)

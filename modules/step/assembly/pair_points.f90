@@ -11,6 +11,8 @@ module gravier_pair_points
   real(dp), parameter :: same = 1.0e-6_dp
   !> depths that are equal, over the distance of points that are one
   real(dp), parameter :: equal = 1.0e-3_dp
+  !> a point is deeper than another where it is so by this part of their distance
+  real(dp), parameter :: as_deep = 1.0e-2_dp
 
   !> Points in ascending order of their keys.
   type :: pair_points_t
@@ -27,7 +29,7 @@ module gravier_pair_points
     integer, allocatable :: key(:, :)
     !> pairs of pieces whose cores overlap, over all pairs asked for
     integer :: overlapping_cores = 0
-  contains
+    contains
     procedure :: add => pair_points_add
     procedure :: merge_near => pair_points_merge_near
     procedure :: keep_deepest => pair_points_keep_deepest
@@ -216,16 +218,17 @@ contains
   end subroutine drop
 
   !> Bring the impulses, elongations and states that the pair at place `p` keeps to the points of now: to those with the same keys
-  !> first, then what is left, in its order, to the new points. Points take the places of the pair in their order.
+  !> first. What is left goes to the new points, in its order where they are as many. Otherwise the deepest of them takes what bore
+  !> most, and so on: where a point becomes two, the one that stays is the deeper one, whatever the order of the keys. Points take
+  !> the places of the pair in their order.
   pure subroutine carry_memory(points, p, list)
     type(pair_points_t), intent(in) :: points
     integer, intent(in) :: p
     type(neighbour_list_t), intent(inout) :: list
-    integer, allocatable :: source(:)
-    logical, allocatable :: taken(:)
-    real(dp), allocatable :: impulse(:, :), spring(:, :)
+    integer :: source(points%n)
+    real(dp), allocatable :: impulse(:, :), spring(:, :), load(:)
     integer, allocatable :: state(:, :)
-    integer :: k, l, m, row
+    integer :: k, m, row
 
     m = list%points_of(p)
     row = list%memory%key_row
@@ -234,26 +237,12 @@ contains
     impulse = list%impulse(:, p:p + m - 1)
     spring = list%spring(:, p:p + m - 1)
     state = list%state(:, p:p + m - 1)
-    allocate (source(points%n), source=0)
-    allocate (taken(m), source=.false.)
-    do k = 1, points%n
-      do l = 1, m
-        if (any(state(row:row + 1, l) /= points%key(:, k))) cycle
-        source(k) = l
-        taken(l) = .true.
-      end do
-    end do
-    l = 0
-    do k = 1, points%n
-      if (source(k) > 0) cycle
-      do while (l < m)
-        l = l + 1
-        if (taken(l) .or. state(row, l) == 0) cycle
-        source(k) = l
-        taken(l) = .true.
-        exit
-      end do
-    end do
+    if (size(impulse, 1) > 0) then
+      load = impulse(1, :)
+    else
+      load = norm2(spring, dim=1)
+    end if
+    call find_sources(points, state(row:row + 1, :), load, source)
     list%impulse(:, p:p + m - 1) = 0.0_dp
     list%spring(:, p:p + m - 1) = 0.0_dp
     list%state(:, p:p + m - 1) = 0
@@ -283,5 +272,68 @@ contains
     end function are_the_same
 
   end subroutine carry_memory
+
+  !> The place among what a pair keeps that each point takes from, 0 where nothing is left for it.
+  pure subroutine find_sources(points, key, load, source)
+    type(pair_points_t), intent(in) :: points
+    !> keys of what is kept (2, m), the first 0 where nothing is
+    integer, intent(in) :: key(:, :)
+    !> its normal impulse [N s] or, where none are kept, the length of its elongation [m] (m)
+    real(dp), intent(in) :: load(:)
+    !> (points)
+    integer, intent(out) :: source(:)
+    logical :: taken(size(load)), as_many
+    integer :: k, l
+
+    source(:) = 0
+    taken(:) = key(1, :) == 0
+    do k = 1, points%n
+      do l = 1, size(load)
+        if (any(key(:, l) /= points%key(:, k))) cycle
+        source(k) = l
+        taken(l) = .true.
+      end do
+    end do
+    as_many = count(source == 0) == count(.not. taken)
+    do
+      k = deepest_new()
+      l = heaviest_left()
+      if (k == 0 .or. l == 0) exit
+      source(k) = l
+      taken(l) = .true.
+    end do
+
+  contains
+
+    !> The deepest point without a source, the first of those as deep; 0 where all have one.
+    pure integer function deepest_new() result(found)
+      integer :: k
+
+      found = 0
+      do k = 1, points%n
+        if (source(k) > 0) cycle
+        if (found > 0) then
+          if (as_many) return
+          if (points%gap(k) >= points%gap(found) - as_deep*norm2(points%point(:, k) - points%point(:, found))) cycle
+        end if
+        found = k
+      end do
+    end function deepest_new
+
+    !> What is left of the pair and bore most, the first of several; 0 where nothing is left.
+    pure integer function heaviest_left() result(found)
+      integer :: l
+
+      found = 0
+      do l = 1, size(load)
+        if (taken(l)) cycle
+        if (found > 0) then
+          if (as_many .or. load(l) <= load(found)) cycle
+        end if
+        found = l
+      end do
+    end function heaviest_left
+
+  end subroutine find_sources
 
 end module gravier_pair_points

@@ -161,12 +161,14 @@ contains
     integer, allocatable, intent(out) :: moved(:)
     integer, allocatable :: kept(:)
     real(dp) :: point(decomposition%nd)
-    integer :: k, n
+    integer :: k, n, turns(decomposition%nd)
 
     call view%list%find_kept(kept)
     n = 0
     do k = 1, size(kept)
       call find_point(decomposition, view, kept(k), point)
+      ! subdomains of a cell that moves are parts of its box alone, as in deliver
+      if (decomposition%period%moves) call decomposition%period%wrap(point, turns)
       if (decomposition%partition%owner(point) == subdomain) cycle
       n = n + 1
       kept(n) = kept(k)
@@ -187,7 +189,7 @@ contains
       point(:) = position(:, list%candidate(p))
       if (list%antagonist(p) < 0) return
       antagonist(:) = position(:, list%antagonist(p))
-      if (size(list%shift) > 0) call decomposition%period%add_shift(list%shift(p), 1, antagonist)
+      if (size(list%shift) > 0) call decomposition%older_period%add_shift(list%shift(p), 1, antagonist)
       candidate(:) = point
       point(:) = owner_point(decomposition%rule%kind, candidate, antagonist)
     end associate

@@ -13,6 +13,7 @@ program test_facet_contacts
   use gravier_manifold, only: manifold_t
   use gravier_facet_candidates, only: facet_candidate_t, facet_candidates_t, tolerance_for
   use gravier_flat_patch, only: make_facet_piece, set_facet_piece, lies_flat
+  use gravier_facet_rims, only: extend_rims, extend_edge, is_on_wall
   use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
@@ -33,6 +34,7 @@ program test_facet_contacts
   call test_hole()
   call test_gap_in_file()
   call test_facet_piece()
+  call test_rims()
   call test_box_on_floor()
   call test_box_along_floor()
   call test_box_in_corner()
@@ -268,6 +270,46 @@ contains
     end do
     call check_close(worst, 0.0_dp, 1.0e-6_dp, "the floor does")
   end subroutine test_gap_in_file
+
+  !> Of a wall in the shape of an L the rim x = 0 is cut at y = -2 and y = -1 and ends at y = 0, where the wall goes on beyond it.
+  subroutine test_rims()
+    type(near_facets_t) :: near
+    type(convex_piece_t) :: sheet
+    real(dp), parameter :: corners(2, 3, 5) = reshape([0.0_dp, -3.0_dp, 3.0_dp, -3.0_dp, 0.0_dp, -2.0_dp, &
+      & 0.0_dp, -2.0_dp, 3.0_dp, -3.0_dp, 0.0_dp, -1.0_dp, 0.0_dp, -1.0_dp, 3.0_dp, -3.0_dp, 0.0_dp, 0.0_dp, &
+      & 0.0_dp, 0.0_dp, 3.0_dp, -3.0_dp, 0.0_dp, 2.0_dp, 0.0_dp, 0.0_dp, 0.0_dp, 2.0_dp, -2.0_dp, 0.0_dp], [2, 3, 5])
+    real(dp) :: corner(3, 3)
+    integer :: k
+
+    near%n = 0
+    do k = 1, 5
+      corner(1:2, :) = corners(:, :, k)
+      corner(3, :) = 0.0_dp
+      call near%add(k, corner)
+    end do
+    near%tolerance = 1.0e-7_dp
+    call make_facet_piece(sheet)
+    do k = 1, 3
+      call set_facet_piece(near%corner(:, :, k), 2.0_dp, sheet)
+      call extend_rims(near, k, 2.0_dp, sheet)
+      call check_ends(sheet, "all rims")
+      call set_facet_piece(near%corner(:, :, k), 2.0_dp, sheet)
+      call extend_edge(near, k, [-0.8_dp, 0.0_dp, 0.6_dp], [1, 3], 2.0_dp, sheet)
+      call check_ends(sheet, "the edge that is touched")
+    end do
+    call check(is_on_wall(near, [-0.5_dp, 0.5_dp, 0.0_dp], 1.0e-6_dp), "a point of the wall")
+    call check(.not. is_on_wall(near, [-0.5_dp, -0.5_dp, 0.0_dp], 1.0e-6_dp), "a point beyond the rim")
+  end subroutine test_rims
+
+  !> The rim of test_rims from end to end, in a facet whose corners 1 and 3 are on it.
+  subroutine check_ends(sheet, what)
+    type(convex_piece_t), intent(in) :: sheet
+    character(len=*), intent(in) :: what
+
+    call check_close(2.0_dp*min(sheet%vertex(2, 1), sheet%vertex(2, 3)), -3.0_dp, 1.0e-14_dp, what//": lower end")
+    call check_close(2.0_dp*max(sheet%vertex(2, 1), sheet%vertex(2, 3)), 0.0_dp, 1.0e-14_dp, what//": upper end")
+    call check_close(max(abs(sheet%vertex(1, 1)), abs(sheet%vertex(1, 3))), 0.0_dp, 1.0e-14_dp, what//": on the line")
+  end subroutine check_ends
 
   subroutine test_facet_piece()
     type(convex_piece_t) :: sheet
