@@ -10,16 +10,19 @@ module gravier_lone_process
   !> and PALS.
   character(len=*), parameter :: launchers(*) = [character(len=21) :: "PMIX_RANK", "PMIX_NAMESPACE", "PMI_RANK", "PMI_FD", &
     & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
-  !> what is suggested: names and values
-  character(len=*), parameter :: suggested(2, 2) = reshape([character(len=31) :: &
-    & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1"], [2, 2])
-  integer, parameter :: n_suggested = size(suggested, 2)
+  !> What is suggested: names and values. The last one holds as long as the process goes on, for it is read where the first file is
+  !> opened: isolated processes have one directory of Open MPI in common, and the shared file pointers that are in memory ("sm")
+  !> would keep their files there, which the first process that ends removes under the others. No shared file pointer is in use here.
+  character(len=*), parameter :: suggested(2, 3) = reshape([character(len=31) :: &
+    & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1", "OMPI_MCA_sharedfp", "lockedfile"], [2, 3])
+  !> suggestions, and how many of them count for MPI_Init alone
+  integer, parameter :: n_suggested = size(suggested, 2), n_for_start = 2
 
 contains
 
   !> Suggest to Open MPI how it starts a process that is alone; before MPI_Init.
   subroutine ease_start(eased)
-    !> which of the suggestions are new, and are to be forgotten
+    !> which of the suggestions are new
     logical, intent(out) :: eased(n_suggested)
     integer :: k, length
 
@@ -33,13 +36,13 @@ contains
     end do
   end subroutine ease_start
 
-  !> Forget the suggestions after MPI_Init: programs that this process starts would find them.
+  !> Forget after MPI_Init the suggestions that count for it alone: programs that this process starts would find them.
   subroutine start_is_over(eased)
     !> of `ease_start`
     logical, intent(in) :: eased(n_suggested)
     integer :: k
 
-    do k = 1, n_suggested
+    do k = 1, n_for_start
       if (eased(k)) call forget_environment(trim(suggested(1, k)))
     end do
   end subroutine start_is_over

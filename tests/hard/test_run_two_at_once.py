@@ -10,7 +10,7 @@ import sys
 import unittest
 import unittest.mock
 
-from gravier_runs import RunTestCase, each, gravier, merged, namelist, run_case, write
+from gravier_runs import PROGRAMS, RunTestCase, each, gravier, merged, namelist, run_case, write
 from killed_runs import Going
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -91,6 +91,25 @@ class TwoAtOnce(RunTestCase):
         self.assertEqual(status, 4, said)
         self.assertIn("interrupted *** by SIGTERM", said)
         self.assertNotIn(".gravier.lock", os.listdir(results))
+
+    def test_runs_of_their_own(self):
+        """Runs in places of their own that begin and end beside each other, without a launcher: none of them says or loses anything,
+        though Open MPI has one directory for all of them."""
+        case = namelist(merged(CASE, {"time": {"steps": 40}}))
+        environment = {key: value for key, value in os.environ.items() if not key.startswith("OMPI_MCA_")}
+        environment["OMPI_MCA_orte_tmpdir_base"] = self.here("session")
+        os.makedirs(self.here("session"))
+
+        def run(number):
+            directory = self.here(f"own_{number}")
+            os.makedirs(directory)
+            write(os.path.join(directory, "case.nml"), case)
+            return subprocess.run([os.path.join(PROGRAMS, "gravier"), "case.nml"], cwd=directory, env=environment, text=True,
+                                  stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+        for ended in each(run, [(number,) for number in range(72)], workers=12):
+            self.assertEqual(ended.stderr, "")
+            self.assertEqual(ended.returncode, 0)
 
     def test_ranks_that_outlive_their_launcher(self):
         """A rank that is left holds the second byte of the lock: a run waits while it goes, and is refused where it stays."""

@@ -6,7 +6,7 @@ program test_small_modules
   use gravier_kinds, only: dp
   use gravier_magnitude, only: is_bounded, is_size, sharpest
   use gravier_process, only: pause_for, suggest_environment, forget_environment
-  use gravier_lone_process, only: ease_start, start_is_over
+  use gravier_lone_process, only: ease_start, start_is_over, n_suggested
   use gravier_allocator_tuning, only: keep_heap
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
@@ -41,10 +41,11 @@ contains
 
   !> A process that no launcher has started suggests something to Open MPI, but for what the user has said; another one nothing.
   subroutine check_lone_process()
-    character(len=*), parameter :: isolated = "OMPI_MCA_ess_singleton_isolated", pml = "OMPI_MCA_pml"
+    character(len=*), parameter :: isolated = "OMPI_MCA_ess_singleton_isolated", pml = "OMPI_MCA_pml", &
+      & pointers = "OMPI_MCA_sharedfp"
     character(len=*), parameter :: launchers(*) = [character(len=21) :: "PMIX_RANK", "PMIX_NAMESPACE", "PMI_RANK", "PMI_FD", &
       & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
-    logical :: is_new, eased(2)
+    logical :: is_new, eased(n_suggested)
     integer :: k
 
     do k = 1, size(launchers)
@@ -52,10 +53,12 @@ contains
     end do
     call forget_environment(isolated)
     call forget_environment(pml)
+    call forget_environment(pointers)
     do k = 1, size(launchers)
       call suggest_environment(trim(launchers(k)), "0", is_new)
       call ease_start(eased)
-      call check(value_of(isolated) == "" .and. value_of(pml) == "", "started by "//trim(launchers(k)))
+      call check(value_of(isolated) == "" .and. value_of(pml) == "" .and. value_of(pointers) == "", &
+        & "started by "//trim(launchers(k)))
       call forget_environment(trim(launchers(k)))
     end do
     call suggest_environment(pml, "of the user", is_new)
@@ -70,6 +73,8 @@ contains
     call check(value_of(pml) == "ob1", "no network is looked for")
     call start_is_over(eased)
     call check(value_of(pml) == "", "programs that it starts may do so")
+    call check(value_of(pointers) == "lockedfile", "files are opened after MPI_Init")
+    call forget_environment(pointers)
   end subroutine check_lone_process
 
   !> Of a variable of the environment, empty where it is not set.
