@@ -1,6 +1,7 @@
 !> From an input file to the bodies file of gravier_sample.
 module gravier_sample_file
   use gravier_errors, only: error_t, raise, status_ok, status_input
+  use gravier_allocator_tuning, only: give_back_arrays
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: reset_timers
@@ -69,6 +70,7 @@ contains
     type(bodies_data_t) :: data
     type(shape_library_t) :: shapes
 
+    call give_back_arrays()
     call check_written_sample(comm, config, error)
     if (allocated(error)) return
     if (config%scene%shapes /= "") call read_shapes(comm, trim(config%scene%shapes), config%scene%dimension, shapes, error)

@@ -3,10 +3,10 @@ module gravier_allocator_tuning
   use, intrinsic :: iso_c_binding, only: c_int
   implicit none
   private
-  public :: keep_heap
+  public :: keep_heap, give_back_arrays
 
   ! parameters of the GNU C library's mallopt
-  integer(c_int), parameter :: trim_threshold = -1, mmap_max = -4
+  integer(c_int), parameter :: trim_threshold = -1, mmap_threshold = -3, mmap_max = -4
 
   interface
     integer(c_int) function c_mallopt(parameter, value) bind(C, name="mallopt")
@@ -26,5 +26,13 @@ contains
     ignored = c_mallopt(trim_threshold, -1_c_int)
     ignored = c_mallopt(mmap_max, 0_c_int)
   end subroutine keep_heap
+
+  !> Give each array of a megabyte or more back to the system where it is deallocated, in a program that makes its arrays once.
+  !> By itself the C library keeps arrays below 32 MiB once it has seen such a one, and the peak depends on what lies between them.
+  subroutine give_back_arrays()
+    integer(c_int) :: ignored
+
+    ignored = c_mallopt(mmap_threshold, 2_c_int**20)
+  end subroutine give_back_arrays
 
 end module gravier_allocator_tuning

@@ -7,7 +7,7 @@ program test_small_modules
   use gravier_magnitude, only: is_bounded, is_size, sharpest
   use gravier_process, only: pause_for, suggest_environment, forget_environment
   use gravier_lone_process, only: ease_start, start_is_over, n_suggested
-  use gravier_allocator_tuning, only: keep_heap
+  use gravier_allocator_tuning, only: keep_heap, give_back_arrays
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
@@ -102,7 +102,19 @@ contains
   !> What is given back stays: a second allocation of nearly as much takes no memory from the machine.
   subroutine check_heap()
     real(dp), allocatable :: a(:)
-    integer(int64) :: first, second
+    integer(int64) :: first, second, third
+
+    allocate (a(2000000))
+    a(:) = 1.0_dp
+    deallocate (a)
+    call give_back_arrays()
+    third = resident()
+    allocate (a(1000000))
+    a(:) = 1.0_dp
+    first = resident()
+    deallocate (a)
+    second = resident()
+    call check(third == 0 .or. (first - third > 7000_int64 .and. second - third < 1000_int64), "8 MB are given back")
 
     call keep_heap()
     allocate (a(4000000))
