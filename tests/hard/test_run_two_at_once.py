@@ -1,5 +1,5 @@
 """Programs that write to one place at the same time: one of them does its work, the others are refused in one line with status 2,
-before anything is overwritten."""
+before anything is overwritten. Programs that write to places of their own do not disturb each other."""
 import contextlib
 import fcntl
 import os
