@@ -99,8 +99,8 @@ contains
     call check(real(after - before, dp)/real(rate, dp) < 5.0_dp, "and not seconds")
   end subroutine check_pause
 
-  !> Arrays are given back to the system after `give_back_arrays`. After `keep_heap` they stay: a second allocation of nearly as much
-  !> takes no memory from the machine.
+  !> Arrays are given back to the system after `give_back_arrays`. After `keep_heap` they stay: a second allocation of nearly as
+  !> much takes no memory from the machine.
   subroutine check_heap()
     real(dp), allocatable :: a(:)
     integer(int64) :: first, second, third
