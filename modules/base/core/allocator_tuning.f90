@@ -28,7 +28,8 @@ contains
   end subroutine keep_heap
 
   !> Give each array of a megabyte or more back to the system where it is deallocated, in a program that makes its arrays once.
-  !> By itself the C library keeps arrays below 32 MiB once it has seen such a one, and the peak depends on what lies between them.
+  !> By itself the C library gives arrays back until one of up to 32 MiB is deallocated. It keeps arrays of that size from then on,
+  !> and the peak depends on how they fit between others.
   subroutine give_back_arrays()
     integer(c_int) :: ignored
 

@@ -1,6 +1,7 @@
 !> The moment of the contacts on each boundary about its pivot, as a drum, a vane or the cylinder of a shear cell feels it.
 module gravier_boundary_moments
   use gravier_kinds, only: dp
+  use gravier_rotation, only: cross
   use gravier_contact_kernels, only: lanes, lane_of, block_of, moment_vectors
   use gravier_contact_problem, only: contact_problem_t
   use gravier_contact_places, only: find_contact_place
@@ -106,9 +107,7 @@ contains
       ! the pivot has moved to the end of the step
       call boundary%find_image(place(1:nd), arm)
       arm(:) = arm - (boundary%pivot - physics%theta*physics%h*boundary%velocity)
-      moment(1) = arm(2)*p(3) - arm(3)*p(2)
-      moment(2) = arm(3)*p(1) - arm(1)*p(3)
-      moment(3) = arm(1)*p(2) - arm(2)*p(1)
+      moment(:) = cross(arm, p)
       if (row%rolling_radius == 0) return
       if (nd == 2) then
         moment(3) = moment(3) + sub%hot(q, row%rolling_radius, g)*sub%impulse(q, 3, g)
