@@ -116,6 +116,37 @@ class ShapeLaws(RunTestCase):
                 run = play(title, tower, [plate], strength, 400, gravity=[0.0, -G])
                 np.testing.assert_allclose(self.track(run, place=2)[-1], [(1.0 - np.cos(8.0)) / 20.0, 0.25], atol=1e-3)
 
+    def test_stuck_to_boundaries_that_turn(self):
+        """A block that sticks to a boundary by springs with an overlap, or by bonds over a gap, goes round with it about an axis in its surface and
+        does not drift along it: both have their contact at one point. On a boundary at rest the moment takes what the block has not gained."""
+        rate, half = 5.0, 0.1
+        laws = {-1e-3: {"kind": "elastic", "normal_stiffness": 1e6, "pull_off_force": 1e3, "friction": 5.0, "spring_restitution": 0.3},
+                2e-3: {"kind": "bonded", "bond_strength": 1e6, "bond_friction": 1.0, "bond_distance": 3e-3}}
+        grounds = {"plane": plane, "segment": lambda _: {"shape": "segment", "point": [1.0, 0.0], "end": [-1.0, 0.0]},
+                   "rectangle": lambda _: {"shape": "rectangle", "point": [-1.0, -1.0, 0.0], "edge_a": [2.0, 0.0, 0.0], "edge_b": [0.0, 2.0, 0.0]}}
+        for dimension, gap, shape in ((2, -1e-3, "plane"), (2, 2e-3, "segment"), (3, -1e-3, "rectangle"), (3, 2e-3, "plane")):
+            ground = {"name": "ground", **grounds[shape](dimension), "material": "m", "pivot": [0.0] * dimension}
+            parts = {"material": [{"name": "m", "density": 1000.0}], "law": [{"materials": "m", **laws[gap]}]}, {"scene": {"alert_distance": 4e-3}}
+            height = half + gap
+            with self.subTest("turns", dimension=dimension, gap=gap, shape=shape):
+                turning = {**ground, "rotation": [-rate] if dimension == 2 else [0.0, rate, 0.0]}
+                start = body("block", up(dimension, height), STILL[dimension], up(dimension, 0.0, rate * height), turning["rotation"])
+                run = self.play(f"turning boundary {dimension} {gap} {shape}", dimension, [start], [turning], *parts,
+                                {"scene": {"gravity": [0.0] * dimension}, "time": {"steps": 200}})
+                along = np.array(up(dimension, -np.sin(1.0), np.cos(1.0)))
+                self.assertAlmostEqual(self.track(run)[-1] @ along, 0.0, delta=1e-5)
+            with self.subTest("moment", dimension=dimension, gap=gap, shape=shape):
+                run = self.play(f"moment {dimension} {gap} {shape}", dimension, [body("block", up(dimension, height), STILL[dimension])], [ground], *parts,
+                                {"scene": {"gravity": up(dimension, 0.0, -G)}, "output": {"boundary_moments": True}, "time": {"steps": 50}})
+                place, velocity = self.track(run), self.track(run, "velocity")
+                mass = 1000.0 * (2.0 * half)**dimension
+                spin = velocity[:, -1] if dimension == 2 else -velocity[:, -2]
+                of_body = mass * (place[:, 0] * velocity[:, dimension - 1] - place[:, -1] * velocity[:, 0] + 4.0 * half**2 / 6.0 * spin)
+                of_weight = mass * G * (place[1:, -1] + place[:-1, -1]) / 2.0
+                moment = run.history()["moment_z:ground" if dimension == 2 else "moment_y:ground"]
+                np.testing.assert_allclose(of_weight - np.diff(of_body) / 1e-3, np.array(floats(moment)) * (1 if dimension == 2 else -1),
+                                           atol=1e-8 * mass * G)
+
     def test_flush_joints(self):
         """A block slides over the joint of two blocks side by side, loose on a plane or glued, of two segments or two rectangles: with or without
         friction it keeps the velocity that it has on one block, at any step."""

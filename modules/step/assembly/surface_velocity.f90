@@ -15,7 +15,8 @@ module gravier_surface_velocity
   type :: contact_place_t
     !> from the centre of the candidate, and of an antagonist that is a grain, to the contact [m]
     real(dp) :: arm_i(3) = 0.0_dp, arm_j(3) = 0.0_dp
-    !> point of the surface of an antagonist that is a boundary [m]
+    !> where an antagonist that is a boundary is touched: on its surface by disks and spheres, at the end of the arm by bodies with
+    !> shapes [m]
     real(dp) :: on_wall(3) = 0.0_dp
   end type contact_place_t
 

@@ -101,8 +101,8 @@ contains
     associate (sub => problem%sub(s), nd => problem%kernels%nd, row => problem%kernels%row, q => lane_of(c), g => block_of(c))
       call problem%impulse_on_candidate(s, c, p(1:nd))
       call find_contact_place(problem%kernels, view, sub, c, place(1:nd))
-      ! where the boundary is touched; glued grains are touched half-way between the surfaces
-      if (sub%pair(2, c) > sub%n_grains .and. view%list%antagonist(sub%source(c)) < 0) &
+      ! disks and spheres touch a boundary on its surface; all other contacts are half-way between the surfaces
+      if (row%arm_i == 0 .and. view%list%antagonist(sub%source(c)) < 0) &
         & place(1:nd) = place(1:nd) - 0.5_dp*sub%gap(c)*sub%hot(q, 1:nd, g)
       ! the pivot has moved to the end of the step
       call boundary%find_image(place(1:nd), arm)

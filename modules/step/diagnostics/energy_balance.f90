@@ -353,8 +353,6 @@ contains
           point(:) = bodies%position(:, j) + arm_j
         else
           point(:) = bodies%position(:, i) + arm_i
-          ! arms end half-way between the surfaces
-          if (k < 0) point(:) = point - 0.5_dp*sub%gap(c)*normal
         end if
       else if (k < 0) then
         point(:) = bodies%position(:, i) - (bodies%radius(i) + sub%gap(c))*normal
