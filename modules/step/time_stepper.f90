@@ -127,7 +127,7 @@ module gravier_time_stepper
     integer(i8) :: messages = 0, values = 0
     !> over all steps: solves that missed their tolerance, grains that left by outlets, grains too fast for the step
     integer(i8) :: failed = 0, left = 0, fast = 0
-    !> steps, the last ones, in which the kinetic energy of the grains was at most `rest_energy` [J]
+    !> steps, the last ones, in which the kinetic energy of the grains was at most `rest_energy` [J] and no grain was to enter
     integer :: quiet = 0
     real(dp) :: rest_energy = 0.0_dp
     !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
@@ -148,8 +148,7 @@ module gravier_time_stepper
 
 contains
 
-  !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end.
-  !> Collective.
+  !> One step. After a solve that diverged, velocities and places are not those of any step: the run must end. Collective.
   subroutine time_stepper_advance(self, figures, error, watch)
     class(time_stepper_t), target, intent(inout) :: self
     type(step_figures_t), intent(out) :: figures
@@ -411,7 +410,8 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
-    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy .and. figures%entered == 0)
+    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy .and. figures%entered == 0 .and. &
+      & .not. self%inflow%awaits(self%time))
     call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast

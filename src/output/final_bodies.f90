@@ -4,7 +4,7 @@ module gravier_final_bodies
   use gravier_errors, only: error_t
   use gravier_config_types, only: config_t
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls
-  use gravier_bodies_hdf5, only: write_bodies_hdf5
+  use gravier_bodies_hdf5, only: write_bodies_hdf5, holds_bodies
   use gravier_contact_forces, only: list_forces
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, of_end
@@ -63,8 +63,9 @@ contains
   end subroutine final_bodies_write
 
   !> Write grains with their shapes, the walls that came with them, the period and, on request, the contacts that press, with
-  !> their forces. Boundaries of the input file are not written: the next input file has its own. Contacts name them. Collective;
-  !> errors are the same on all ranks.
+  !> their forces. Boundaries of the input file are not written: the next input file has its own. Contacts name them. A run that
+  !> goes on from a checkpoint and makes no step knows no forces: a file that holds its state already is left as it is.
+  !> Collective; errors are the same on all ranks.
   subroutine write_final_bodies(simulation, path, with_forces, made_by, error)
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: path
@@ -114,8 +115,11 @@ contains
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin
       data%period(:) = decomposition%period%length
-      if (with_forces .and. allocated(simulation%problem%sub)) call list_forces(simulation%problem, decomposition, &
-        & simulation%halo, simulation%physics%h, data%contacts)
+      if (allocated(simulation%problem%sub)) then
+        if (with_forces) call list_forces(simulation%problem, decomposition, simulation%halo, simulation%physics%h, data%contacts)
+      else if (simulation%restarted) then
+        if (holds_bodies(simulation%comm, path, decomposition%shapes, data)) return
+      end if
       call write_bodies_hdf5(simulation%comm, path, data, error, decomposition%shapes)
     end associate
   end subroutine write_final_bodies

@@ -450,8 +450,10 @@ contains
 
     call write_lines(self, phase_lines(self%comm, seconds, phases), "", error)
     call write_lines(self, work_lines(self%comm, simulation), "", error)
-    call write_lines(self, accuracy_lines(simulation), "", error)
-    call write_lines(self, cost_lines(self%comm, simulation), "", error)
+    if (simulation%tally%steps > 0) then
+      call write_lines(self, accuracy_lines(simulation), "", error)
+      call write_lines(self, cost_lines(self%comm, simulation), "", error)
+    end if
     call write_lines(self, population_lines(simulation), "", error)
     warnings = self%progress%warnings()
     if (warnings /= "") call self%line("warnings    "//warnings, error)

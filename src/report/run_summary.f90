@@ -177,6 +177,8 @@ contains
       else if (is_doubtful(simulation)) then
         text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
           & to_text(simulation%config%solver%tolerance, 2)//", but "//doubts_text(simulation)
+      else if (tally%steps == 0) then
+        text = "no step was left to make after step "//to_text(simulation%step)
       else
         text = "all "//to_text(simulation%step)//" steps reached the "//goal_name(simulation)
         if (goal_name(simulation) /= "accuracy") text = text//" and the accuracy"
@@ -193,7 +195,7 @@ contains
         end if
       end if
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
-      if (simulation%restarted) text = text//"; errors and overlaps are those since the restart"
+      if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text
 

@@ -45,6 +45,7 @@ contains
     if (rests(simulation)) then
       why = "the kinetic energy of the grains was at most "//to_text(simulation%rest_energy, 3)//" J in "// &
         & to_text(steps_at_rest)//" steps"
+      if (simulation%inflow%is_blocked(simulation%time)) why = why//", and grains that are still to enter found no place"
       return
     end if
     grains = simulation%n_grains - simulation%n_glued

@@ -425,7 +425,7 @@ class Restart(RunTestCase):
 
     def test_beginning_and_end(self):
         """Without a checkpoint it begins; with nothing left to do it changes nothing; a new run forgets an old checkpoint."""
-        case = merged(BOX, {"time": {"steps": 7}, "output": {"every": 3, "checkpoint_every": 2, "final_bodies": True}})
+        case = merged(BOX, {"time": {"steps": 7}, "output": {"every": 3, "checkpoint_every": 2, "final_bodies": True, "final_forces": True}})
         straight = self.straight("end", case)
         directory = self.here("beginning")
         run = run_case(case, 1, directory, options=["--restart"])
@@ -433,10 +433,21 @@ class Restart(RunTestCase):
         self.assertIn("restart     no checkpoint in results: from the beginning\n", run.stdout)
         self.assert_same(straight, directory)
         final = content(run.path("results", "final_bodies.h5"))
-        for ranks in (1, 2):
-            self.assert_status(restart(directory, ranks), 0)
+        with h5py.File(run.path("results", "final_bodies.h5")) as file:
+            self.assertGreater(len(file["contacts/force"]), 0)
+        for ranks in (1, 2, 3):
+            again = restart(directory, ranks)
+            self.assert_status(again, 0)
+            self.assertIn("warning     no step is left to make: ", again.stdout)
+            self.assertIn("finished    no step was left to make after step 7; results in results\n", again.stdout)
             self.assert_same(straight, directory, "nothing to do")
             self.assertEqual(content(run.path("results", "final_bodies.h5")), final)
+        # a state of other bodies than those of the checkpoint does not stay
+        with h5py.File(run.path("results", "final_bodies.h5"), "r+") as file:
+            file["bodies/velocity"][3, 1] += 1e-9
+        self.assert_status(restart(directory), 0)
+        with h5py.File(run.path("results", "final_bodies.h5")) as file:
+            self.assertNotIn("contacts", file)
         # a checkpoint in the middle becomes the end: bodies and boundaries of the last state are there
         shorter = self.here("shorter")
         self.assert_status(run_case(merged(case, {"time": {"steps": 5}}), 1, shorter), 0)

@@ -17,7 +17,7 @@ module gravier_bodies_hdf5
   use gravier_bodies_contacts, only: contact_sets, read_contacts, write_contacts, contact_words
   implicit none
   private
-  public :: read_bodies_hdf5, write_bodies_hdf5
+  public :: read_bodies_hdf5, write_bodies_hdf5, holds_bodies
 
   character(len=*), parameter :: body_sets(7) = [character(len=8) :: "id", "position", "velocity", "radius", "mass", "group", &
     & "material"]
@@ -280,6 +280,33 @@ contains
     if (present(shapes) .and. allocated(sorted%shape)) call write_body_shapes(file, sorted, shapes, error)
     call file%close(error)
   end subroutine write_bodies_hdf5
+
+  !> Whether there is a file that holds these very bodies: the same identifiers, places and velocities to the last bit. Collective.
+  logical function holds_bodies(comm, path, shapes, bodies) result(holds)
+    type(communicator_t), intent(in) :: comm
+    character(len=*), intent(in) :: path
+    !> of the bodies; empty where all are disks or spheres
+    type(shape_library_t), intent(in) :: shapes
+    type(bodies_data_t), intent(in) :: bodies
+    type(bodies_data_t) :: found, sorted_found, sorted
+    type(error_t), allocatable :: none
+    logical :: exists
+
+    exists = .false.
+    if (comm%rank == 0) inquire (file=path, exist=exists)
+    holds = comm%any_true(exists)
+    if (.not. holds) return
+    call read_bodies_hdf5(comm, path, bodies%dimension, shapes, found, none)
+    holds = .not. allocated(none)
+    if (.not. holds) return
+    call sort_by_id(comm, found, sorted_found)
+    call sort_by_id(comm, bodies, sorted)
+    holds = sorted_found%n == sorted%n
+    if (holds) holds = all(sorted_found%id == sorted%id)
+    if (holds) holds = .not. any(abs(sorted_found%position - sorted%position) > 0.0_dp)
+    if (holds) holds = .not. any(abs(sorted_found%velocity - sorted%velocity) > 0.0_dp)
+    holds = .not. comm%any_true(.not. holds)
+  end function holds_bodies
 
   subroutine write_groups(comm, file, bodies, error)
     type(communicator_t), intent(in) :: comm

@@ -41,6 +41,7 @@ module gravier_inflow
     procedure :: is_due => inflow_is_due
     procedure :: enter => inflow_enter
     procedure :: awaits => inflow_awaits
+    procedure :: is_blocked => inflow_is_blocked
     procedure :: entered => inflow_entered
     procedure :: mass => inflow_mass
     procedure :: get_state => inflow_get_state
@@ -85,6 +86,23 @@ contains
       awaits = awaits .or. self%insertions(k)%awaits(time)
     end do
   end function inflow_awaits
+
+  !> Whether some insertion might let grains enter and has no places for them.
+  pure logical function inflow_is_blocked(self, time) result(is_blocked)
+    class(inflow_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: k
+
+    is_blocked = .false.
+    if (.not. self%exists()) return
+    do k = 1, size(self%insertions)
+      associate (insertion => self%insertions(k))
+        is_blocked = is_blocked .or. (time >= insertion%start .and. time < insertion%end .and. &
+          & .not. (insertion%is_complete() .or. insertion%awaits(time)))
+      end associate
+    end do
+  end function inflow_is_blocked
 
   !> Grains that have entered so far.
   pure integer(i8) function inflow_entered(self) result(entered)

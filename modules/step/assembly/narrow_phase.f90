@@ -176,8 +176,8 @@ contains
     end associate
   end subroutine write_point
 
-  !> Where point `k` of pair `p` is: both bodies have it at one place, half-way between their surfaces. What sticks to a boundary that
-  !> turns would drift if the boundary had it on its surface, by half the gap or overlap times the angle.
+  !> Where point `k` of pair `p` is: both bodies have it at one place, half-way between their surfaces. What sticks to a boundary
+  !> that turns would drift if the boundary had it on its surface, by half the gap or overlap times the angle.
   pure type(contact_place_t) function place_of_point(view, nd, p, points, k) result(place)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: nd, p, k
