@@ -61,6 +61,16 @@ class Package(RunTestCase):
         read = gravier.parse_namelist("&boundary velocity = 0.0, , -0.02,\n force = ,1 ! a\u2028b c\n mass = 2*, 3.0 /\n")
         self.assertEqual(read, {"boundary": [{"velocity": [0.0, None, -0.02], "force": [None, 1], "mass": [None, None, 3.0]}]})
         self.assertEqual(gravier.value_text([0.0, None, -0.02]), "0.0, , -0.02")
+        # entries by their index, a group that ends with &end, and a key apart from its value
+        read = gravier.parse_namelist("&region name = 'x' lower(2) = 0.1, upper( 2:3 ) = 1,\n 2 &END\n&a x(3)=1 x(1)=2 b\n =\n .true. /")
+        self.assertEqual(read, {"region": [{"name": "x", "lower": [None, 0.1], "upper": [None, 1, 2]}], "a": [{"x": [2, None, 1], "b": True}]})
+        for text, words in (("&scene a = 1, a = 2 /", "&scene a is given twice"), ("&a x(1) = 1, x = 2 /", "&a x is given twice"),
+                            ("&a x(2) = 1, x(1:2) = 2, 3 /", "&a x(2) is given twice"), ("&a x = 1", "&a is not closed: expected /"),
+                            ("&a x = 1 /\n y = 2", "'y =' outside a group"), ("&a 3 /", "'3' in &a: expected `key = value` or /"),
+                            ("&a x = 1 &b y = 2 /", "'&b' in &a: expected `key = value` or /"), ("&a x(q) = 1 /", "&a x(q): expected an index as (2) or (2:3)")):
+            with self.assertRaises(gravier.CaseError) as refused:
+                gravier.parse_namelist(text)
+            self.assertEqual(str(refused.exception), words)
 
     def test_command(self):
         done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "--help"], capture_output=True,

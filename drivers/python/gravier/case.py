@@ -49,39 +49,76 @@ def entries(keys, name, missing):
     return full
 
 
-TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^']|'')*'|"(?:[^"]|"")*")|(?P<mark>[&/=,])|(?P<word>[^\s&/=,!'"]+))""")
+TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^'\n]|'')*'|"(?:[^"\n]|"")*")|(?P<group>&\w+)|(?P<key>[A-Za-z]\w*)\s*(?P<index>\([^()]*\))?\s*=|"""
+                   r"""(?P<mark>[/,])|(?P<word>[^\s&/=,!'"]+)|(?P<odd>\S))""")
 
 
 def parse_namelist(text):
     """{group: [{key: value}, ...]} of an input file; a value is a bool, an int, a float, a text, or a list of these, with None for an entry
-    that nothing is said of (`0.0, , 1.0`)."""
-    # not splitlines, which takes a few other characters for ends of lines
-    tokens = [match for line in text.split("\n") for match in TOKEN.finditer(line) if match.lastgroup]
-    groups, keys, key, place = {}, None, None, 0
-    # commas before the next value, of which each but the first after a value stands for an entry
-    commas, first = 0, True
-    while place < len(tokens):
-        token = tokens[place]
-        following = tokens[place + 1]["mark"] if place + 1 < len(tokens) else None
-        if token["mark"] == "&" and place + 1 < len(tokens):
-            keys, key = {}, None
-            groups.setdefault(tokens[place + 1][0].strip().lower(), []).append(keys)
-            place += 1
-        elif token["mark"] == "/":
-            keys = key = None
-        elif keys is not None and token["word"] and following == "=":
-            key = token["word"].lower()
-            keys[key] = []
-            commas, first = 0, True
-            place += 1
-        elif key is not None and token["mark"] == ",":
-            commas += 1
-        elif key is not None and token["mark"] is None:
-            keys[key] += [None] * (commas if first else max(0, commas - 1)) + _values(token)
-            commas, first = 0, False
-        place += 1
-    return {group: [{key: value[0] if len(value) == 1 else value for key, value in keys.items()} for keys in several]
-            for group, several in groups.items()}
+    that nothing is said of (`0.0, , 1.0`, `lower(3) = 1.0`). CaseError where the text is no namelist, or says an entry twice."""
+    groups, keys, name, into = {}, None, None, None
+    for token in TOKEN.finditer(text):
+        kind = token.lastgroup if token["key"] is None else "key"
+        if kind == "group" and keys is None:
+            name, keys, into = token["group"][1:].lower(), {}, None
+            groups.setdefault(name, []).append(keys)
+        elif token["mark"] == "/" or kind == "group" and token["group"].lower() == "&end":
+            if keys is None:
+                raise CaseError(f"'{token[0].strip()}' outside a group")
+            keys.update({key: entry.value() for key, entry in keys.items()})
+            keys = None
+        elif kind == "key" and keys is not None:
+            into = keys.setdefault(token["key"].lower(), _Entry(f"&{name} {token['key'].lower()}"))
+            into.begin(token["index"])
+        elif kind == "mark" and into is not None:
+            into.comma()
+        elif kind in ("text", "word") and into is not None and keys is not None:
+            into.take(_values(token))
+        elif kind is not None:
+            raise CaseError(f"'{token[0].strip()}' " + ("outside a group" if keys is None else f"in &{name}: expected `key = value` or /"))
+    if keys is not None:
+        raise CaseError(f"&{name} is not closed: expected /")
+    return groups
+
+
+class _Entry:
+    """What a group says of a key, in one assignment or in several of its entries."""
+
+    def __init__(self, name):
+        self.name, self.found, self.last, self.is_array = name, {}, 0, False
+
+    def begin(self, index):
+        """`key =` or `key(index) =`: where its values go."""
+        if index is None and self.found:
+            raise CaseError(f"{self.name} is given twice")
+        first, _, rest = (index or "()")[1:-1].partition(":")
+        last, _, step = rest.partition(":")
+        try:
+            self.place, self.step = int(first.strip() or 1), int(step.strip() or 1)
+            int(last.strip() or 1)
+        except ValueError:
+            raise CaseError(f"{self.name}{index}: expected an index as (2) or (2:3)") from None
+        self.is_array = self.is_array or index is not None
+        # commas before the next value, of which each but the first after a value stands for an entry
+        self.commas, self.is_first = 0, True
+
+    def comma(self):
+        self.commas += 1
+
+    def take(self, values):
+        for value in [None] * (self.commas if self.is_first else max(0, self.commas - 1)) + values:
+            if self.place in self.found:
+                raise CaseError(f"{self.name}({self.place}) is given twice")
+            if value is not None:
+                self.found[self.place] = value
+            self.last = self.place
+            self.place += self.step
+        self.commas, self.is_first = 0, False
+
+    def value(self):
+        """A scalar where it was written as one."""
+        found = [self.found.get(place) for place in range(1, max([self.last, *self.found]) + 1)]
+        return found[0] if len(found) == 1 and not self.is_array else found
 
 
 def _values(token):
