@@ -111,6 +111,17 @@ class Jobs(RunTestCase):
                                                              "replaced; expected a template of another name\n"))
         with open(own, encoding="utf-8") as file:
             self.assertEqual(file.read(), "! mine\n")
+        # a list from Windows with blank lines; a row that is wrong is found before the first one runs
+        write(os.path.join(self.work, "odd.nml"), case)
+        write(os.path.join(self.work, "odd.csv"), "mu\r\n0.1\r\n \r\n\r\n")
+        self.assertEqual(self.sh("gravier_job", "--list", "odd.csv", "odd.nml").returncode, 0)
+        write(os.path.join(self.work, "late.nml"), case)
+        write(os.path.join(self.work, "late.csv"), "mu\n0.1\n0.2,0.3\n")
+        done = self.sh("gravier_job", "--list", "late.csv", "late.nml")
+        self.assertEqual((done.returncode, done.stderr), (2, "gravier_job: error: late.csv: line 3: 2 columns; expected 1\n"))
+        self.assertFalse(os.path.exists(os.path.join(self.work, "late_1")))
+        done = self.sh("gravier_job", "odd_1.nml", GRAVIER_MARGIN="abc")
+        self.assertEqual((done.returncode, done.stderr), (2, "gravier_job: error: GRAVIER_MARGIN=abc: expected seconds, 0 or more\n"))
 
     def test_without_a_scheduler_it_goes_on_by_itself(self):
         write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 80}}))
