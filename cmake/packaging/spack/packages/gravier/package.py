@@ -1,3 +1,5 @@
+import pathlib
+
 from spack.package import *
 
 try:
@@ -10,10 +12,12 @@ class Gravier(CMakePackage):
     """Dense granular matter by nonsmooth contact dynamics, with domain decomposition: rigid bodies
     under unilateral contact and friction, in Fortran 2008 and MPI."""
 
+    # the clone that has this recipe
+    git = pathlib.Path(__file__).resolve().parents[5].as_uri()
+
     license("BSD-3-Clause")
 
-    # a version is a checkout: spack dev-build gravier@develop, in the source tree
-    version("develop")
+    version("develop", branch="main")
 
     variant("tests", default=False, description="build the tests")
     variant("python", default=True, description="scripts: importer, studies, figures")

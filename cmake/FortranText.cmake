@@ -1,0 +1,17 @@
+# fortran_text(VARIABLE TEXT): a character literal, over several lines when it would not fit on one behind a declaration of 60 characters
+function(fortran_text variable text)
+  set(pieces "")
+  while(TRUE)
+    string(SUBSTRING "${text}" 0 60 piece)
+    string(LENGTH "${text}" length)
+    # a quote within counts twice
+    string(REPLACE "\"" "\"\"" piece "${piece}")
+    string(APPEND pieces "\"${piece}\"")
+    if(length LESS_EQUAL 60)
+      break()
+    endif()
+    string(SUBSTRING "${text}" 60 -1 text)
+    string(APPEND pieces " &\n    & //")
+  endwhile()
+  set(${variable} "${pieces}" PARENT_SCOPE)
+endfunction()
