@@ -41,7 +41,7 @@ class TextsOfTheBuild(unittest.TestCase):
         with tempfile.TemporaryDirectory() as scratch:
             script = os.path.join(scratch, "texts.cmake")
             with open(script, "w", encoding="utf-8") as file:
-                file.write(f"include({SOURCE}/cmake/FortranText.cmake)\n")
+                file.write(f"cmake_minimum_required(VERSION 3.20)\ninclude({SOURCE}/cmake/FortranText.cmake)\n")
                 file.writelines(f'fortran_text(text "{path}")\nfile(APPEND {scratch}/texts "${{text}}\\n")\n' for path in paths)
             subprocess.run(["cmake", "-P", script], check=True, timeout=60)
             with open(os.path.join(scratch, "texts"), encoding="utf-8") as file:
