@@ -13,6 +13,8 @@ module gravier_checkpoint_scene
   public :: check_scene, check_steps, fixed_options
 
   character(len=*), parameter :: newline = achar(10)
+  !> in a line that tells contents of a file apart: before its path and behind it
+  character(len=*), parameter :: contents_of = "contents of ", digest_mark = ", digest "
   !> groups of the input that a run must go on with as it began
   character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &insertion &material &law"
 
@@ -76,7 +78,7 @@ contains
     character(len=*), intent(in) :: path, before, now, input
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: line_before, line_now
-    integer :: at_before, at_now
+    integer :: at_before, at_now, named
 
     at_before = 1
     at_now = 1
@@ -84,6 +86,12 @@ contains
       call next_line(before, at_before, line_before)
       call next_line(now, at_now, line_now)
       if (line_before == line_now) cycle
+      named = index(line_now, digest_mark)
+      if (index(line_now, contents_of) == 1 .and. index(line_before, line_now(1:named)) == 1) then
+        call raise(error, status_input, input//": "//line_now(1:named - 1)//" are not those with which "//path// &
+          & " was written: expected the file as it was then")
+        return
+      end if
       call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
         & ": expected "//trim(adjustl(line_before)))
       return
@@ -151,7 +159,7 @@ contains
       character(len=*), intent(in) :: path
       integer(i8), intent(in) :: digest
 
-      text = text//"contents of "//path//", digest "//to_text(digest)//newline
+      text = text//contents_of//path//digest_mark//to_text(digest)//newline
     end subroutine add_contents
 
   end function fixed_options

@@ -385,7 +385,7 @@ class Shapes(RunTestCase):
             if status == 0:
                 self.assert_status(run, 0)
             else:
-                self.assert_refused(run, ("case.nml: the scene is not that of", "contents of a.shapes, digest", "expected contents of a.shapes"))
+                self.assert_refused(run, ("case.nml: contents of a.shapes are not those with which results/checkpoint.h5 was written: expected the file as it was then",))
 
 
 if __name__ == "__main__":
