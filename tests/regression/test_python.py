@@ -257,13 +257,13 @@ class Package(RunTestCase):
                                    (("two.h5", "--chains"), "two.h5: a bodies file has no regions and no chains"),
                                    (("two.h5", "--colour", "subdomain"), "two.h5: a bodies file has no subdomains"),
                                    (("heap/results/results.h5",), "no /bodies with id, position and radius; expected a bodies file"),
-                                   (("none.h5",), "none.h5: cannot read this file; expected a bodies file")):
+                                   (("none.h5",), "none.h5: no such file; expected a bodies file")):
             status, said = self.plot("packing", *arguments)
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(message, said)
 
     def test_refusals(self):
-        for arguments, message in ((("packing", "nowhere"), "results.h5: cannot read this file"),
+        for arguments, message in ((("packing", "nowhere"), "results.h5: no such file; expected the results of a run"),
                                    (("packing", "heap/results", "--step", "5"), "no step 5; expected one of 0, 100"),
                                    (("packing", "heap/results", "--out", "x.txt"), "ends in .png or .svg"),
                                    (("packing", "heap/results", "--colour", "subdomain"), "vtk = .true."),

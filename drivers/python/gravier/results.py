@@ -7,7 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .case import parse_namelist
+from .case import CaseError, parse_namelist
 from .checksum import is_whole
 from .shapes import axes_of, ball, shapes_of
 
@@ -46,10 +46,12 @@ class Table(dict):
 @contextmanager
 def _opened(path, kind):
     """An HDF5 file, open; what cannot be read of it is an error of one line."""
+    if not Path(path).exists():
+        raise ResultsError(f"{path}: no such file; expected {kind}")
     try:
         with h5py.File(path, "r") as file:
             yield file
-    except (ArithmeticError, AttributeError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as reason:
+    except (ArithmeticError, AttributeError, CaseError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as reason:
         # h5py and numpy have all of these for what is not as a run wrote it
         raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
 
@@ -113,7 +115,7 @@ class Run:
             self.version, self.command, self.input_text = (_text(what[name]) for name in ("version", "command", "input_text"))
             self.steps = np.array(sorted(int(name) for name in file["steps"]), dtype=int)
             self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
-        self.case = parse_namelist(self.input_text)
+            self.case = parse_namelist(self.input_text)
 
     @contextmanager
     def _open(self):
