@@ -1,11 +1,8 @@
 import pathlib
 
-from spack.package import *
+from spack_repo.builtin.build_systems.cmake import CMakePackage
 
-try:
-    from spack_repo.builtin.build_systems.cmake import CMakePackage
-except ImportError:  # before Spack 1.0
-    pass
+from spack.package import *
 
 
 class Gravier(CMakePackage):
