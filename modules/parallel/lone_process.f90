@@ -12,9 +12,11 @@ module gravier_lone_process
     & "OMPI_COMM_WORLD_SIZE", "SLURM_STEP_ID", "FLUX_TASK_RANK", "ALPS_APP_PE", "PALS_RANKID"]
   !> What is suggested: names and values. The last one holds as long as the process goes on, for it is read where the first file
   !> is opened. Isolated processes have one directory of Open MPI in common. Shared file pointers in memory ("sm") would keep files
-  !> there, which the first process that ends removes under the others. No shared file pointer is in use here.
+  !> there, which the first process that ends removes under the others. Those beside a file ("lockedfile") leave a file for each
+  !> process that is killed, and those of their own ("individual") two, which the next process there removes. No shared file
+  !> pointer is in use here.
   character(len=*), parameter :: suggested(2, 3) = reshape([character(len=31) :: &
-    & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1", "OMPI_MCA_sharedfp", "lockedfile"], [2, 3])
+    & "OMPI_MCA_ess_singleton_isolated", "1", "OMPI_MCA_pml", "ob1", "OMPI_MCA_sharedfp", "individual"], [2, 3])
   !> suggestions, and how many of them count for MPI_Init alone
   integer, parameter :: n_suggested = size(suggested, 2), n_for_start = 2
 

@@ -4,6 +4,8 @@ module gravier_output_files
   use gravier_errors, only: error_t, raise, status_input
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: place_of, place_t, check_directory, is_directory
+  use gravier_hdf5_file, only: check_length
+  use gravier_own_files, only: part_of
   use gravier_config_types, only: config_t
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
@@ -85,6 +87,7 @@ contains
     !> of the files, with commas between
     character(len=*), intent(in) :: names
     type(error_t), allocatable, intent(inout) :: error
+    type(error_t), allocatable :: reason
     character(len=:), allocatable :: name
     integer :: first
 
@@ -92,6 +95,8 @@ contains
     do
       call take_name(names, first, name)
       if (name == "" .or. allocated(error)) exit
+      call check_length(part_of(trim(config%output%directory)//"/"//name), reason)
+      if (allocated(reason)) call raise(error, status_input, config%file//": &output directory: "//reason%message)
       if (is_directory(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
         & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//name// &
         & ", as a file of this run; expected another name for one of them")

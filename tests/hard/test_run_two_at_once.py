@@ -111,6 +111,31 @@ class TwoAtOnce(RunTestCase):
             self.assertEqual(ended.stderr, "")
             self.assertEqual(ended.returncode, 0)
 
+    def test_files_of_a_run_alone(self):
+        """A run leaves no files but its own, and the next one removes what MPI leaves of a run that is killed. Paths may be as long as MPI
+        takes them; longer ones are refused before there is a directory."""
+        own = ["checkpoint.h5", "history.csv", "results.h5", "run.log"]
+        name = "d" * (200 - len("/checkpoint.h5.part") - len(self.here("")))
+        for ranks in (1, 2):
+            self.assert_status(run_case(merged(CASE, {"output": {"directory": self.here(name)}}), ranks, self.here("far")), 0)
+            self.assertEqual(sorted(os.listdir(self.here(name))), own)
+            run = run_case(merged(CASE, {"output": {"directory": self.here(name + "d")}}), ranks, self.here("far"))
+            self.assert_status(run, 2)
+            self.assertEqual(run.stderr, f"gravier: error: case.nml: &output directory: {self.here(name)}d/checkpoint.h5.part: a path of 201 characters; "
+                             "MPI opens files with up to 200: expected a path from a directory that is nearer\n")
+            self.assertFalse(os.path.exists(self.here(name + "d")))
+        directory = self.here("killed alone")
+        os.makedirs(directory)
+        write(os.path.join(directory, "long.nml"), namelist(LONG))
+        process = subprocess.Popen([os.path.join(PROGRAMS, "gravier"), "long.nml"], cwd=directory, stdout=subprocess.PIPE, text=True)
+        for line in process.stdout:
+            if line.split()[:1] == ["2"]:
+                break
+        process.kill()
+        process.communicate()
+        self.assert_status(run_case(CASE, 1, directory), 0)
+        self.assertEqual(sorted(os.listdir(os.path.join(directory, "results"))), own)
+
     def test_ranks_that_outlive_their_launcher(self):
         """A rank that is left holds the second byte of the lock: a run waits while it goes, and is refused where it stays."""
         directory = self.here("outlived")

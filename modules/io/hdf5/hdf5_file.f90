@@ -4,10 +4,11 @@
 !> procedure with an `error` is collective and leaves the same error on all ranks. What is wrong with a file that is read ends in
 !> status_input, what fails while writing in status_failure.
 module gravier_hdf5_file
+  use gravier_hdf5_storage, only: check_length
   use gravier_hdf5_tables, only: h5_tables_t, table_integer, table_single, table_double
   implicit none
   private
-  public :: h5_file_t
+  public :: h5_file_t, check_length
   public :: table_integer, table_single, table_double
 
   !> An open HDF5 file. Paths start at the root: "/steps/12/bodies/id".

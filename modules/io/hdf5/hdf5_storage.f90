@@ -10,6 +10,7 @@ module gravier_hdf5_storage
     & h5pset_obj_track_times_f, hid_t, hsize_t
   use gravier_kinds, only: i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
+  use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_disk_space, only: reserve_space, extend_file
   use gravier_file_system, only: check_readable, check_creatable, file_length, remove_file, replace_file
@@ -17,7 +18,7 @@ module gravier_hdf5_storage
   use gravier_hdf5_properties, only: start_library, parallel_access, ask_for_one_block
   implicit none
   private
-  public :: h5_storage_t, bytes_of_link
+  public :: h5_storage_t, bytes_of_link, check_length
 
   !> An open HDF5 file.
   type, abstract :: h5_storage_t
@@ -62,6 +63,8 @@ module gravier_hdf5_storage
     end subroutine abandon
   end interface
 
+  !> characters of a path: Open MPI 4.1 ends a process that opens a file whose path has more than some 230
+  integer, parameter :: longest_path = 200
   !> reserved for an empty file, and for the link of a hidden group or other headers
   integer(i8), parameter :: bytes_of_file = 16384, bytes_of_link = 16384
   !> groups at the root that find room in its first block
@@ -82,7 +85,7 @@ contains
 
     if (allocated(error)) return
     call prepare(self, comm, path, part_of(path), error)
-    if (comm%rank == 0) then
+    if (comm%rank == 0 .and. .not. allocated(error)) then
       call check_creatable(self%path, error)
       call reserve_space(self%path, bytes_of_file, error)
       if (allocated(error)) call remove_file(self%path)
@@ -165,7 +168,7 @@ contains
     if (allocated(error)) return
     call prepare(self, comm, name, path, error)
     ! one rank alone looks first: a file that HDF5 cannot make sense of is never opened by all together
-    if (comm%rank == 0) then
+    if (comm%rank == 0 .and. .not. allocated(error)) then
       call check_format(path, error)
       if (writable) call reserve_space(path, bytes_of_file, error)
     end if
@@ -207,7 +210,18 @@ contains
     self%path = path
     self%flushed = 0
     self%reserved = 0
+    call check_length(path, error)
   end subroutine prepare
+
+  !> Refuse a path with which MPI may not open a file (status_input).
+  pure subroutine check_length(path, error)
+    !> while the file is written, it has `part_of` its path
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (len(path) > longest_path) call raise(error, status_input, path//": a path of "//to_text(len(path))// &
+      & " characters; MPI opens files with up to "//to_text(longest_path)//": expected a path from a directory that is nearer")
+  end subroutine check_length
 
   !> Give the file its name, with what was written so far; it stays open. On failure it is removed, and an older file stays.
   subroutine h5_show(self, error)
