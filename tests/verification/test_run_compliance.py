@@ -325,7 +325,7 @@ class Tangential(ComplianceScene):
         # amplitudes over the displacement at which sliding begins
         yields = friction * depth / ratio
         turns = np.cumsum([0, 1.5, 2.5, 1.5, 2.7, 0.4]) * yields / speed
-        turns = np.round(turns / self.step) * self.step
+        turns = (np.round(turns / self.step) * self.step).tolist()
         tables = {}
         for name, sign in (("up.csv", -1), ("down.csv", 1)):
             rows = ["time,vx"]

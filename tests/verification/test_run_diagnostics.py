@@ -26,7 +26,7 @@ def grains_csv(path, positions, velocities=None, radii=None):
     radii = np.full(len(positions), RADIUS) if radii is None else radii
     text = "id,radius,mass," + ",".join([*axes, *("v" + axis for axis in axes)]) + "\n"
     for k, (x, v) in enumerate(zip(positions, velocities)):
-        text += f"{k + 1},{radii[k]!r},{MASS!r}," + ",".join(repr(float(number)) for number in (*x, *v)) + "\n"
+        text += f"{k + 1},{float(radii[k])!r},{MASS!r}," + ",".join(repr(float(number)) for number in (*x, *v)) + "\n"
     return write(path, text)
 
 

@@ -276,7 +276,7 @@ class Jammed(RunTestCase):
     def test_forces_that_are_not_unique(self):
         n, r = 6, 0.01
         places = [(r * (1 + 2 * i + j % 2), r * (1 + np.sqrt(3) * j)) for j in range(n) for i in range(n - j % 2)]
-        write(self.here("jammed.csv"), "id,x,y,radius\n" + "\n".join(f"{k},{x!r},{y!r},{r}" for k, (x, y) in enumerate(places, 1)) + "\n")
+        write(self.here("jammed.csv"), "id,x,y,radius\n" + "\n".join(f"{k},{x!r},{float(y)!r},{r}" for k, (x, y) in enumerate(places, 1)) + "\n")
         top = r * (2 + np.sqrt(3) * (n - 1))
         case = {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": self.here("jammed.csv"), "friction": 0.5},

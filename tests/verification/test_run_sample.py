@@ -216,7 +216,7 @@ class Samples(RunTestCase):
         with open(os.path.join(directory, "bodies.csv"), "w", encoding="ascii") as file:
             file.write("id,x,y,radius\n")
             for k, (x, y) in enumerate(bodies.position):
-                file.write(f"{k + 1},{x!r},{y!r},{bodies.radius[k]!r}\n".replace("np.float64(", "").replace(")", ""))
+                file.write(f"{k + 1},{float(x)!r},{float(y)!r},{float(bodies.radius[k])!r}\n")
         case = merged(SOLVED, {
             "scene": {"dimension": 2, "bodies": "file", "bodies_file": "bodies.csv", "friction": 0.0, "gravity": [0.0, 0.0]},
             "time": {"step": 1e-3, "steps": 50}, "output": {"directory": "out", "every": 0}})

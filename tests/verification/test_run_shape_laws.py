@@ -358,7 +358,7 @@ class ShapeLaws(RunTestCase):
         """A prism of 16 sides and a cube stand on springs and are pulled along the ground by a load that rises slowly, at default settings. Nothing
         slides: they move by the shear of the springs and by that of rocking on them, along the load alone."""
         circle = [(0.5 * np.cos(np.pi * k / 8), 0.5 * np.sin(np.pi * k / 8)) for k in range(16)]
-        prism = "hull " + " ".join(f"{x!r} {y!r} {z!r}" for z in (-0.5, 0.5) for x, y in circle)
+        prism = "hull " + " ".join(f"{float(x)!r} {float(y)!r} {z!r}" for z in (-0.5, 0.5) for x, y in circle)
         for name, text in (("prism", prism), ("cube", "box 1 1 1")):
             with self.subTest(name):
                 n, k, weight, pull = 16 if name == "prism" else 4, 1e5, 10.0, 1.0
