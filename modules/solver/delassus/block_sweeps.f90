@@ -62,6 +62,11 @@ contains
       moved_before = moved
       least = min(least, moved)
       if (mod(sweeps, window) == 0) then
+        ! where a local problem is singular, impulses may stand still without being a solution
+        if (least <= control%tolerance) then
+          if (reached()) return
+          least = figure
+        end if
         call look_at_growth()
         if (growth%ends() .or. .not. promising(least_before, least, control)) exit
         least_before = least

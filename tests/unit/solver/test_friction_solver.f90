@@ -30,6 +30,7 @@ program test_friction_solver
   call check_turns()
   call check_best_is_kept()
   call check_start_is_kept()
+  call check_mass_on_a_wire()
   call check_random(2, 24)
   call check_random(3, 24)
   ! beyond the order of dense factors
@@ -325,6 +326,35 @@ contains
     end do
     call check(report%sweeps > sweeps, "sweeps came behind Newton's steps")
   end subroutine check_best_is_kept
+
+  !> A mass that can move along a wire alone strikes a rough plane: its local operator is singular, so that sweeps may stand still
+  !> without a solution. Newton's method takes over.
+  subroutine check_mass_on_a_wire()
+    type(delassus_t) :: problem
+    type(friction_report_t) :: report
+    type(error_t), allocatable :: error
+    real(dp), parameter :: frictions(0:2) = [0.1_dp, 0.3_dp, 1.0_dp]
+    real(dp) :: along(2), w(2, 2), q(2), mu(1), r(2, 1), angle
+    integer :: k, n_taken
+
+    n_taken = 0
+    do k = 0, 59
+      angle = (5.0_dp + 2.9_dp*k)*acos(-1.0_dp)/180.0_dp
+      along(1) = sin(angle)
+      along(2) = cos(angle)
+      w(:, 1) = along*along(1)
+      w(:, 2) = along*along(2)
+      q(:) = -0.88_dp*along
+      mu(:) = frictions(mod(k, 3))
+      call pack(2, w, q, mu, problem)
+      r(:, :) = 0.0_dp
+      call solve_friction(problem, friction_control_t("auto"), r, report, error)
+      call check(.not. allocated(error) .and. report%converged, "a mass on a wire")
+      call check(report%sweeps < 2500, "sweeps that stand still are no promise")
+      if (report%newton_steps > 0) n_taken = n_taken + 1
+    end do
+    call check(n_taken > 0, "on some wires sweeps stand still")
+  end subroutine check_mass_on_a_wire
 
   !> Proximal points: of the many solutions of a stack, that near the start is found, self-stress included.
   subroutine check_start_is_kept()
