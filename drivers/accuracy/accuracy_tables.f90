@@ -6,6 +6,7 @@ module gravier_accuracy_tables
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: make_directory
   use gravier_own_files, only: check_own_files
+  use gravier_table_place, only: check_table_place
   use gravier_output_lock, only: output_lock_t
   use gravier_accuracy_study, only: study_t
   use gravier_accuracy_input, only: read_study
@@ -37,6 +38,11 @@ contains
     if (.not. allocated(error) .and. study%kind == "run") call check_scenes(comm, study, error)
     if (.not. allocated(error)) call prepare_directory(comm, study, error)
     call lock%take_directory(comm, study%directory, "gravier_accuracy "//path, error)
+    if (comm%rank == 0 .and. .not. allocated(error)) then
+      call check_table_place(study%directory//"/accuracy.csv", "title,kind,", error)
+      call check_table_place(study%directory//"/accuracy_summary.csv", "variant,figure,", error)
+    end if
+    call comm%agree(error)
     if (allocated(error)) then
       call lock%release()
       return

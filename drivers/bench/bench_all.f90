@@ -7,6 +7,7 @@ module gravier_bench_all
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: check_creatable, remove_file
   use gravier_own_files, only: check_own_files, part_of
+  use gravier_table_place, only: check_table_place
   use gravier_output_lock, only: output_lock_t
   use gravier_bench_groups, only: measure_exchange, measure_interface, measure_steps, measure_scaling
   use gravier_bench_kernels, only: kernel_problem_t, make_kernels, measure_kernels, sweep_kernel, make_effects, measure_effects
@@ -48,6 +49,7 @@ contains
       call check_creatable(part_of(options%csv), reason)
       if (allocated(reason)) call raise(error, status_input, "--csv '"//options%csv//"': "//reason%message)
       call remove_file(part_of(options%csv))
+      call check_table_place(options%csv, "group,case,size,", error)
     end if
     call world%agree(error)
     call lock%take_file(world, options%csv, "gravier_bench", error)

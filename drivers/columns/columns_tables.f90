@@ -6,6 +6,7 @@ module gravier_columns_tables
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: make_directory
   use gravier_own_files, only: check_own_files
+  use gravier_table_place, only: check_table_place
   use gravier_output_lock, only: output_lock_t
   use gravier_solve, only: solve_report_t, solve_converged
   use gravier_columns_options, only: options_t
@@ -34,6 +35,11 @@ contains
     if (options%count > 0) columns(1) = column_t(0, options%count, options%subdomains)
     call prepare_directory(comm, options%directory, error)
     call lock%take_directory(comm, options%directory, "gravier_columns", error)
+    if (comm%rank == 0) then
+      call check_table_place(options%directory//"/columns_table.csv", "problem,disks,", error)
+      call check_table_place(options%directory//"/columns_error.csv", "problem,method,", error)
+    end if
+    call comm%agree(error)
     if (.not. allocated(error)) call solve_columns(comm, columns, options%tolerance, reports, error)
     if (allocated(error)) then
       call lock%release()

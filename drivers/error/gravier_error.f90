@@ -4,6 +4,7 @@ program gravier_error
   use gravier_errors, only: error_t, status_ok
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_own_files, only: check_own_files
+  use gravier_table_place, only: check_table_place
   use gravier_output_lock, only: output_lock_t
   use gravier_config, only: parse_config
   use gravier_read_case, only: read_input
@@ -48,6 +49,7 @@ contains
 
     call read_input(comm, options%file, text, error)
     if (.not. allocated(error)) call parse_config(options%file, text, options%plan%config, error)
+    if (comm%rank == 0) call check_table_place(options%table, "title,method,", error)
     call comm%agree(error)
     call lock%take_file(comm, options%table, "gravier_error "//options%file, error)
     if (.not. allocated(error)) call measure_case(comm, options%plan, rows, error)

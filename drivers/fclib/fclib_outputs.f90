@@ -1,8 +1,10 @@
-!> The files that gravier_fclib writes: none of them may be one that it reads, and no two of them may be one.
+!> The files that gravier_fclib writes: none of them may be one that it reads, no two of them may be one, and what they replace is
+!> of their kind.
 module gravier_fclib_outputs
   use gravier_errors, only: error_t, raise, status_input
   use gravier_file_system, only: path_t, place_t, place_of
   use gravier_own_files, only: part_of
+  use gravier_table_place, only: check_table_place, check_hdf5_place
   implicit none
   private
   public :: written_path, check_outputs
@@ -54,6 +56,11 @@ contains
           & ": expected a file of its own for each of --csv, --profile and the problems of --write")
       end do
     end do
+    do k = 1, merge(size(files), 0, directory /= "")
+      call check_hdf5_place(paths(k)%text, error)
+    end do
+    if (csv /= "") call check_table_place(csv, "problem,dimension,", error)
+    if (profile /= "") call check_table_place(profile, "ratio,", error)
 
   contains
 

@@ -111,7 +111,7 @@ class Scene:
         word = "polygon" if self.dimension == 2 else "hull"
         text = ""
         for shape in self.shapes.values():
-            text += f"shape {shape.name}\nrounding {shape.rounding!r}\n"
+            text += f"shape {shape.name}\nrounding {float(shape.rounding)!r}\n"
             for piece in shape.pieces:
                 text += word + "".join(f" {x!r}" for x in piece.ravel().tolist()) + "\n"
         (directory / "blocks.shapes").write_text(text, encoding="ascii")

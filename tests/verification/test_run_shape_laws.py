@@ -132,7 +132,9 @@ class ShapeLaws(RunTestCase):
                 turning = {**ground, "rotation": [-rate] if dimension == 2 else [0.0, rate, 0.0]}
                 start = body("block", up(dimension, height), STILL[dimension], up(dimension, 0.0, rate * height), turning["rotation"])
                 run = self.play(f"turning boundary {dimension} {gap} {shape}", dimension, [start], [turning], *parts,
-                                {"scene": {"gravity": [0.0] * dimension}, "time": {"steps": 200}})
+                                {"scene": {"gravity": [0.0] * dimension}, "time": {"steps": 200}, "output": {"energy": True}})
+                history = run.history()
+                self.assertLess(np.abs(floats(history["energy_error"])).max(), 1e-10 * np.abs(floats(history["kinetic_energy"])).max())
                 along = np.array(up(dimension, -np.sin(1.0), np.cos(1.0)))
                 self.assertAlmostEqual(self.track(run)[-1] @ along, 0.0, delta=1e-5)
             with self.subTest("moment", dimension=dimension, gap=gap, shape=shape):

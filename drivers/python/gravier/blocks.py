@@ -213,7 +213,7 @@ def voronoi(count, size, seed=1, relax=3):
             # something has to be left of each side
             shortest = np.linalg.norm(corner - np.roll(corner, 1, axis=0), axis=1).min()
             rounding = min(USUAL_ROUNDING * np.linalg.norm(corner, axis=1).max(), 0.1 * shortest)
-            made.shapes[name] = f"rounding {rounding!r}\npolygon {_numbers(corner)}"
+            made.shapes[name] = f"rounding {float(rounding)!r}\npolygon {_numbers(corner)}"
         else:
             made.shapes[name] = f"hull {_numbers(corner)}"
         made.add(name, centre, volume)

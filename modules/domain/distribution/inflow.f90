@@ -87,7 +87,7 @@ contains
     end do
   end function inflow_awaits
 
-  !> Whether some insertion might let grains enter and has no places for them.
+  !> Whether some insertion is under way and not complete: where none `awaits`, it has no places for its grains.
   pure logical function inflow_is_blocked(self, time) result(is_blocked)
     class(inflow_t), intent(in) :: self
     !> [s]
@@ -98,8 +98,7 @@ contains
     if (.not. self%exists()) return
     do k = 1, size(self%insertions)
       associate (insertion => self%insertions(k))
-        is_blocked = is_blocked .or. (time >= insertion%start .and. time < insertion%end .and. &
-          & .not. (insertion%is_complete() .or. insertion%awaits(time)))
+        is_blocked = is_blocked .or. (time >= insertion%start .and. time < insertion%end .and. .not. insertion%is_complete())
       end associate
     end do
   end function inflow_is_blocked

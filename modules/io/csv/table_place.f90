@@ -1,0 +1,64 @@
+!> Where a program may write a file whose name the user gives: where there is none, an empty one, or one that it has made.
+module gravier_table_place
+  use gravier_errors, only: error_t, raise, status_input
+  use gravier_file_system, only: file_length, is_directory
+  implicit none
+  private
+  public :: check_table_place, check_hdf5_place
+
+  !> first bytes of an HDF5 file
+  character(len=*), parameter :: hdf5_mark = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
+
+contains
+
+  !> Refuse a place for a table (status_input): a name that does not end in .csv, a directory, and a file that does not begin with
+  !> the first columns of the table. Not collective.
+  subroutine check_table_place(path, columns, error)
+    character(len=*), intent(in) :: path
+    !> first names of the header, the last one with its comma
+    character(len=*), intent(in) :: columns
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: length
+
+    if (allocated(error)) return
+    length = len(path)
+    if (path(max(1, length - 3):) /= ".csv") then
+      call raise(error, status_input, path//": expected a name that ends in .csv, as it becomes a table")
+    else
+      call check_origin(path, columns, "a table that this program has made", error)
+    end if
+  end subroutine check_table_place
+
+  !> Refuse a place for an HDF5 file that has a directory or a file of another kind (status_input). Not collective.
+  subroutine check_hdf5_place(path, error)
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+
+    call check_origin(path, hdf5_mark, "an HDF5 file", error)
+  end subroutine check_hdf5_place
+
+  !> Refuse to replace what does not begin as a file of the program does.
+  subroutine check_origin(path, beginning, kind, error)
+    character(len=*), intent(in) :: path, beginning, kind
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=len(beginning)) :: head
+    logical :: exists
+    integer :: unit, stat
+
+    if (allocated(error)) return
+    inquire (file=path, exist=exists)
+    if (.not. exists) return
+    if (.not. is_directory(path)) then
+      if (file_length(path) == 0) return
+      open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat)
+      if (stat == 0) then
+        read (unit, iostat=stat) head
+        close (unit)
+        if (stat == 0 .and. head == beginning) return
+      end if
+    end if
+    call raise(error, status_input, path//": there is something else, which is not replaced; expected the name of no file, or "// &
+      & "of "//kind)
+  end subroutine check_origin
+
+end module gravier_table_place
