@@ -229,6 +229,11 @@ class Messages(RunTestCase):
                  ("./singular.hdf5: expected another file for a table than the problem singular.hdf5",))
         self.has(self.run_program("singular.hdf5", "--csv", "t.csv", "--profile", "./t.csv", program="gravier_fclib"),
                  ("./t.csv: expected a file of its own for each of --csv, --profile and the problems of --write",))
+        self.has(self.run_program("singular.hdf5", "--csv", "table.nml", program="gravier_fclib"),
+                 ("table.nml: expected a name that ends in .csv, as it becomes a table",))
+        write(self.here("notes.csv"), "mine\n")
+        self.has(self.run_program("singular.hdf5", "--csv", "notes.csv", program="gravier_fclib"),
+                 ("notes.csv: there is something else, which is not replaced; expected the name of no file, or of a table that this program has made",))
 
     def test_every_message_is_provoked(self):
         write(self.here("pair.csv"), "id,x,y,radius\n1,0.05,0.05,0.05\n2,0.16,0.05,0.05\n")
