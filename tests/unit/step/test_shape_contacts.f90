@@ -354,7 +354,7 @@ contains
       call check_close(found%place(k)%arm_j(nd), -1.0_dp - 0.5_dp*gap, tight, "the arm of the second box")
       call check_close(found%place(k)%arm_i(1) - found%place(k)%arm_j(1), 1.0_dp, tight, "arms to one place")
       call check_close(found%place(m + k)%arm_i(nd), -1.0_dp - 0.5_dp*gap, tight, "the arm to the plane")
-      call check_close(found%place(m + k)%on_wall(nd), -1.0_dp - gap, tight, "the place on the plane")
+      call check_close(found%place(m + k)%on_wall(nd), -1.0_dp - 0.5_dp*gap, tight, "the place on the plane: the end of the arm")
     end do
     ! the places of the second pair alone
     allocate (view%list%watched(room))
