@@ -5,6 +5,7 @@ module gravier_sample_place
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: make_directory, file_length
   use gravier_hdf5_file, only: h5_file_t
+  use gravier_table_place, only: begins_with
   use gravier_config, only: config_t
   use gravier_run_log, only: run_log_t
   implicit none
@@ -47,7 +48,7 @@ contains
 
     if (file_length(path) == 0) return
     if (path == log_name(config)) then
-      if (begins_as_own(path)) return
+      if (begins_with(path, own_line)) return
     else
       if (says_own(path)) return
     end if
@@ -55,20 +56,6 @@ contains
       & " of another kind or origin, which is not replaced; expected the name of no file, or of one that "// &
       & sample_program//" has made")
   end subroutine refuse_others
-
-  !> Whether the first line of a text file is that of a log of this program.
-  logical function begins_as_own(path) result(own)
-    character(len=*), intent(in) :: path
-    character(len=len(own_line)) :: line
-    integer :: unit, stat
-
-    own = .false.
-    open (newunit=unit, file=path, action="read", status="old", iostat=stat)
-    if (stat /= 0) return
-    read (unit, "(a)", iostat=stat) line
-    own = stat == 0 .and. line == own_line
-    close (unit)
-  end function begins_as_own
 
   !> Whether an HDF5 file says that this program has made it.
   logical function says_own(path) result(own)

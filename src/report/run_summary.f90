@@ -177,7 +177,7 @@ contains
       else if (is_doubtful(simulation)) then
         text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
           & to_text(simulation%config%solver%tolerance, 2)//", but "//doubts_text(simulation)
-      else if (tally%steps == 0) then
+      else if (simulation%restarted .and. tally%steps == 0) then
         text = "no step was left to make after step "//to_text(simulation%step)
       else
         text = "all "//to_text(simulation%step)//" steps reached the "//goal_name(simulation)

@@ -117,11 +117,14 @@ contains
     call write_beginning(self%simulation, self%log, restart, self%lock%unknown, older, error)
     if (allocated(error)) return
     self%is_open = .true.
-    if (is_over(self)) call self%log%line("warning     no step is left to make: what the solve of a step gives (contacts "// &
-      & "and their forces, diagnostics, VTK, FCLIB) is not written anew", error)
     self%interruption%first_step = MPI_Wtime()
     self%interruption%last_checkpoint = self%interruption%first_step
-    if (.not. self%simulation%restarted) call self%output%write(of_states, self%simulation, self%figures, 0.0_dp, error)
+    if (.not. self%simulation%restarted) then
+      call self%output%write(of_states, self%simulation, self%figures, 0.0_dp, error)
+    else if (is_over(self)) then
+      call self%log%line("warning     no step is left to make: what the solve of a step gives (contacts and their forces, "// &
+        & "diagnostics, VTK, FCLIB) is not written anew", error)
+    end if
   end subroutine open_run_begin
 
   !> Whether there is a step to make. The same on all ranks.

@@ -4,7 +4,7 @@ module gravier_table_place
   use gravier_file_system, only: file_length, is_directory
   implicit none
   private
-  public :: check_table_place, check_hdf5_place
+  public :: check_table_place, check_hdf5_place, begins_with
 
   !> first bytes of an HDF5 file
   character(len=*), parameter :: hdf5_mark = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
@@ -41,24 +41,31 @@ contains
   subroutine check_origin(path, beginning, kind, error)
     character(len=*), intent(in) :: path, beginning, kind
     type(error_t), allocatable, intent(inout) :: error
-    character(len=len(beginning)) :: head
     logical :: exists
-    integer :: unit, stat
 
     if (allocated(error)) return
     inquire (file=path, exist=exists)
     if (.not. exists) return
     if (.not. is_directory(path)) then
       if (file_length(path) == 0) return
-      open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat)
-      if (stat == 0) then
-        read (unit, iostat=stat) head
-        close (unit)
-        if (stat == 0 .and. head == beginning) return
-      end if
+      if (begins_with(path, beginning)) return
     end if
     call raise(error, status_input, path//": there is something else, which is not replaced; expected the name of no file, or "// &
       & "of "//kind)
   end subroutine check_origin
+
+  !> Whether a file can be read and begins with these bytes. Not collective.
+  logical function begins_with(path, beginning) result(begins)
+    character(len=*), intent(in) :: path, beginning
+    character(len=len(beginning)) :: head
+    integer :: unit, stat
+
+    begins = .false.
+    open (newunit=unit, file=path, access="stream", form="unformatted", action="read", status="old", iostat=stat)
+    if (stat /= 0) return
+    read (unit, iostat=stat) head
+    close (unit)
+    begins = stat == 0 .and. head == beginning
+  end function begins_with
 
 end module gravier_table_place
