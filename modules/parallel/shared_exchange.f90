@@ -81,6 +81,7 @@ module gravier_shared_exchange
     procedure :: load => shared_exchange_load
     procedure :: add_copies => shared_exchange_add_copies
     procedure :: sum_copies => shared_exchange_sum_copies
+    procedure :: move_to => shared_exchange_move_to
     procedure :: free => shared_exchange_free
   end type shared_exchange_t
 
@@ -252,6 +253,26 @@ contains
     stretch%from = part%neighbour_first(j)
     stretch%to = part%neighbour_first(j + 1) - 1
   end function stretch
+
+  !> Hand the plan over, with the channels: a copy would leave its requests with the memory of this one, and never be given back.
+  subroutine shared_exchange_move_to(self, other)
+    !> is left without a plan
+    class(shared_exchange_t), intent(inout) :: self
+    !> the plan that it has is given back
+    type(shared_exchange_t), intent(inout) :: other
+
+    call other%free()
+    other%comm => self%comm
+    other%width = self%width
+    other%messages = self%messages
+    other%values = self%values
+    call move_alloc(self%part, other%part)
+    call move_alloc(self%near_from, other%near_from)
+    call move_alloc(self%near_to, other%near_to)
+    call move_alloc(self%far, other%far)
+    call move_alloc(self%channel, other%channel)
+    call move_alloc(self%requests, other%requests)
+  end subroutine shared_exchange_move_to
 
   !> Give back the channels and their persistent requests.
   subroutine shared_exchange_free(self)

@@ -34,7 +34,7 @@ module gravier_time_stepper
   use gravier_sleeping, only: sleeping_rule_t, count_rest
   use gravier_borne_impulses, only: take_back
   use gravier_waking, only: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
-  use gravier_whole_problem, only: build_whole, take_whole
+  use gravier_whole_problem, only: build_whole, make_whole, take_whole
   use gravier_impulse_memory, only: keep_impulses, recall_impulses
   use gravier_memory_carrying, only: carry_memory
   use gravier_given_contacts, only: given_contacts_t
@@ -121,6 +121,8 @@ module gravier_time_stepper
     !> figures that the user asked for, and the steps whose states are written, which some of them wait for
     type(diagnostics_t) :: diagnostics
     type(schedule_t) :: written_steps
+    !> the step whose problem is written, 0: none
+    integer :: dumped_step = 0
     !> energies of the grains since this run began or went on from a checkpoint
     type(grain_balance_t) :: balance
     !> messages between ranks, and numbers in them, that iterations of this rank have sent
@@ -191,30 +193,38 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_control_t) :: control
+    real(dp) :: seconds
     integer :: tries, iterations
-    logical :: woken, finds_none
+    logical :: woken
 
     control = self%control
+    iterations = 0
+    seconds = 0.0_dp
     control%figure_ratio = self%figure_ratio
     ! a pass over layers would replace the impulses that were given
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
-    iterations = 0
     do tries = 1, most_tries + 1
       call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
       call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
+      self%messages = self%messages + self%problem%shared%messages
+      self%values = self%values + self%problem%shared%values
+      if (allocated(error) .or. figures%solve%status == solve_diverged) return
+      call self%effort%add(figures%solve%history, figures%solve%iterations, figures%solve%figure, figures%solve%seconds, &
+        & figures%solve%start_seconds)
       figures%solve%iterations = figures%solve%iterations + iterations
-      if (allocated(error) .or. self%resting%bodies == 0 .or. figures%solve%status == solve_diverged) return
-      finds_none = figures%solve%status /= solve_converged
-      if (.not. finds_none) then
+      figures%solve%seconds = figures%solve%seconds + seconds
+      if (self%resting%bodies == 0) return
+      if (figures%solve%status == solve_converged) then
         call wake_disturbed(self%decomposition, self%halo, self%physics, self%problem, 2**(tries - 1), woken)
         if (.not. woken) return
       end if
-      if (finds_none .or. tries == most_tries) then
+      if (figures%solve%status /= solve_converged .or. tries == most_tries) then
         call wake_all(self%decomposition)
         call self%halo%refresh(self%decomposition)
       end if
       figures%tries = tries + 1
       iterations = figures%solve%iterations
+      seconds = figures%solve%seconds
       if (self%warm_start) call keep_impulses(self%problem, self%halo)
       call watch_awake(self%decomposition, self%halo, self%resting)
       call set_up(self, figures)
@@ -290,16 +300,9 @@ contains
   !> Give all grains an applied force, of 0. The same on every rank, between two steps.
   subroutine time_stepper_take_forces(self)
     class(time_stepper_t), intent(inout) :: self
-    integer :: s
 
-    self%decomposition%na = self%decomposition%nd
-    do s = 1, size(self%decomposition%owned)
-      call self%decomposition%owned(s)%take_forces()
-    end do
-    if (.not. allocated(self%halo%view)) return
-    do s = 1, size(self%halo%view)
-      call self%halo%view(s)%bodies%take_forces()
-    end do
+    call self%decomposition%take_forces()
+    call self%halo%take_forces()
   end subroutine time_stepper_take_forces
 
   !> Wake the bodies that sleep: what acts on the scene has changed.
@@ -312,12 +315,9 @@ contains
   !> After a step, bring the contacts back into the problem that it has left out, for whoever looks at all of them. Collective.
   subroutine time_stepper_make_whole(self)
     class(time_stepper_t), intent(inout) :: self
-    type(contact_problem_t) :: whole
 
     if (self%is_whole) return
-    call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
-    call sum_boundary_impulses(self%decomposition, whole, self%boundary_impulses)
-    call take_whole(whole, self%problem, self%is_whole)
+    call make_whole(self%decomposition, self%halo, self%physics, self%boundary_impulses, self%problem, self%is_whole)
   end subroutine time_stepper_make_whole
 
   !> Let grains enter, for which lists are made anew. Collective.
@@ -348,8 +348,8 @@ contains
     end if
     if (self%sleeping%after > 0) call count_rest(self%sleeping, figures%tries == 1, self%halo, self%problem, self%decomposition)
     if (self%warm_start) call keep_impulses(self%problem, self%halo)
-    if (.not. self%is_whole .and. (self%diagnostics%in_each_step() .or. self%written_steps%due(self%step + 1))) &
-      & call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
+    if (.not. self%is_whole .and. (self%diagnostics%in_each_step() .or. self%written_steps%due(self%step + 1) .or. &
+      & self%step + 1 == self%dumped_step)) call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
     if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & figures%uncertain_velocity(self%velocity_scale%bonds), self%halo)
@@ -379,8 +379,6 @@ contains
     type(step_figures_t), intent(inout) :: figures
     type(error_t), allocatable, intent(in) :: error
 
-    self%messages = self%messages + self%problem%shared%messages
-    self%values = self%values + self%problem%shared%values
     if (allocated(error)) return
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
@@ -392,7 +390,6 @@ contains
         return
       end if
       if (solve%status == solve_unbounded) call find_largest_impulse(self%problem, figures%cause)
-      call self%effort%add(solve%history, solve%iterations, solve%figure, solve%seconds, solve%start_seconds)
     end associate
   end subroutine note_solve
 
@@ -470,6 +467,7 @@ contains
       deallocate (self%method)
     end if
     call self%fallback%free()
+    call self%problem%shared%free()
     if (allocated(self%exact)) deallocate (self%exact)
     if (allocated(self%boundary_impulses)) deallocate (self%boundary_impulses)
     if (allocated(self%halo%view)) deallocate (self%halo%view)
@@ -477,6 +475,8 @@ contains
     self%halo%builds = 0
     self%step = 0
     self%time = 0.0_dp
+    self%messages = 0
+    self%values = 0
     self%failed = 0
     self%left = 0
     self%left_mass = 0.0_dp

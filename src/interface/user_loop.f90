@@ -119,6 +119,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(self%cause)) return
+    call wake_where_set(self)
     call self%run%stop(reason, error)
     if (allocated(error)) self%cause = error
   end subroutine user_loop_stop
@@ -141,9 +142,18 @@ contains
         return
       end if
     end associate
+    call wake_where_set(self)
     call self%run%write_checkpoint(error)
     if (allocated(error)) self%cause = error
   end subroutine user_loop_write_checkpoint
+
+  !> What is written before the next step has all bodies awake where a rank has set velocities or forces of some, as that step will
+  !> have them: whichever rank holds them. Collective.
+  subroutine wake_where_set(self)
+    class(user_loop_t), intent(inout) :: self
+
+    if (self%comm%any_true(self%bodies_set)) call self%run%simulation%wake()
+  end subroutine wake_where_set
 
   !> End the run as the program does, and give back what it holds. Collective.
   subroutine user_loop_close(self, error)
@@ -152,6 +162,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     if (allocated(self%cause) .and. .not. allocated(error)) error = self%cause
+    if (.not. allocated(error)) call wake_where_set(self)
     call self%run%finish(error)
     call release_signals()
     call self%comm%free()
@@ -289,8 +300,6 @@ contains
         self%velocities_set = .true.
       end if
       self%bodies_set = .true.
-      ! the step wakes grains on all ranks; a checkpoint that is written before it has those of this rank awake
-      call self%run%simulation%wake()
     end associate
   end subroutine user_loop_set_array
 

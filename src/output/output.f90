@@ -46,7 +46,8 @@ module gravier_output
     end function files_interface
 
     !> Create the files in the output directory or, where the simulation is restarted, go on with those that are there: what they
-    !> hold of later steps goes. It sets stage and schedule even after an error. Rank 0 may fail alone. Collective.
+    !> hold of later steps goes. It sets stage and schedule even after an error, which is the same on all ranks. Rank 0 may fail
+    !> alone. Collective.
     subroutine open_interface(self, simulation, directory, command, error)
       import :: output_t, simulation_t, error_t
       implicit none
@@ -57,7 +58,7 @@ module gravier_output
       type(error_t), allocatable, intent(inout) :: error
     end subroutine open_interface
 
-    !> Write the present step; without effect after an error. Rank 0 may fail alone. Collective.
+    !> Write the present step; without effect after an error, which is the same on all ranks. Rank 0 may fail alone. Collective.
     subroutine write_interface(self, simulation, figures, seconds, error)
       import :: output_t, simulation_t, step_figures_t, error_t, dp
       implicit none

@@ -49,8 +49,8 @@ contains
       n = n + 1
       call move_alloc(all_kinds(k)%output, self%output(n)%output)
       call self%output(n)%output%open(simulation, trim(simulation%config%output%directory)//"/", command, error)
+      call self%comm%agree(error)
     end do
-    call self%comm%agree(error)
   end subroutine run_output_open
 
   !> Whether some output of a stage is due in a step.
@@ -69,8 +69,8 @@ contains
     end do
   end function run_output_due
 
-  !> Write the outputs of a stage that are due in the present step and not written yet. Collective; errors are the same on all
-  !> ranks.
+  !> Write the outputs of a stage that are due in the present step and not written yet. Collective; rank 0 may have an error before,
+  !> and all ranks have the same one afterwards where something was due.
   subroutine run_output_write(self, stage, simulation, figures, seconds, error, always)
     class(run_output_t), intent(inout) :: self
     !> one of the constants of gravier_output
@@ -96,12 +96,13 @@ contains
         ! contacts of bodies that sleep come back for whoever writes contacts
         if (any(stage == [after_solve, of_states, of_end])) call simulation%make_whole()
         if (stage == of_checkpoints) call sync(self, error)
+        if (.not. wrote) call self%comm%agree(error)
         call item%write(simulation, figures, seconds, error)
+        call self%comm%agree(error)
         item%last = simulation%step
         wrote = .true.
       end associate
     end do
-    if (wrote) call self%comm%agree(error)
     call stop_timer(phase_output)
   end subroutine run_output_write
 
@@ -113,8 +114,8 @@ contains
 
     do k = 1, size(self%output)
       call self%output(k)%output%sync(error)
+      call self%comm%agree(error)
     end do
-    call self%comm%agree(error)
   end subroutine sync
 
   !> Write the last state and what belongs to the end, and close. Collective; errors are the same on all ranks.

@@ -124,6 +124,7 @@ contains
     else if (is_over(self)) then
       call self%log%line("warning     no step is left to make: what the solve of a step gives (contacts and their forces, "// &
         & "diagnostics, VTK, FCLIB) is not written anew", error)
+      call comm%agree(error)
     end if
   end subroutine open_run_begin
 
@@ -174,6 +175,7 @@ contains
       interruption%dearest = max(interruption%dearest, interruption%last_checkpoint - now)
       if (.not. allocated(error)) call self%log%line("checkpoint  of step "//to_text(self%simulation%step)//" written in "// &
         & to_text(interruption%last_checkpoint - now, 3)//" s", error)
+      call self%simulation%comm%agree(error)
       interruption%last_step = MPI_Wtime()
     end associate
   end subroutine open_run_write_checkpoint
@@ -208,6 +210,7 @@ contains
     end if
     if (self%is_made) then
       call self%log%close(error)
+      call self%simulation%comm%agree(error)
       call self%simulation%free()
     end if
     self%is_made = .false.

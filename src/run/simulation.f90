@@ -293,6 +293,7 @@ contains
       self%control%check_every = config%solver%check_every
       self%control%trace = config%output%trace
       self%written_steps = schedule_t(every=config%output%every, last=config%time%steps)
+      self%dumped_step = config%output%fclib_step
       if (config%scene%bodies == "column") allocate (self%exact, source=column_solution_t(config%scene%column_count, &
         & -config%scene%mass*config%scene%gravity(config%scene%dimension)*config%time%step))
       self%warm_start = config%solver%warm_start

@@ -217,8 +217,9 @@ with gravier.Simulation(case, quiet=True) as s:
 
     def test_bodies_set_on_some_ranks(self):
         """A rank without a subdomain sets nothing, and one may set what it wants to: the same bits as on one rank. Grains that sleep wake on
-        all ranks."""
-        groups = merged(HEAP, {"solver": {"sleeping": True, "tolerance": 1e-3}, "time": {"steps": 1210}, "output": {"every": 300}})
+        all ranks, in a checkpoint too."""
+        groups = merged(HEAP, {"solver": {"sleeping": True, "tolerance": 1e-3}, "time": {"steps": 1210},
+                               "output": {"every": 300, "checkpoint_every": 0}})
         script = """
 with gravier.Simulation(case, quiet=True, forces=True) as s:
     while s.goes_on:
@@ -229,6 +230,8 @@ with gravier.Simulation(case, quiet=True, forces=True) as s:
                 part.spin = np.where((part.id == 1)[:, None], 3.0, part.spin)
             if s.made == 1200 and 48 in part.id:
                 part.force = np.where((part.id == 48)[:, None], [0.0, 1.0], 0.0)
+        if s.made == 1200:
+            s.checkpoint()
 """
         for subdomains in (1, 2):
             case = merged(groups, {"decomposition": {"subdomains": subdomains}})

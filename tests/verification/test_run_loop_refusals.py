@@ -275,6 +275,14 @@ with gravier.Simulation(case) as s:
         stale = script.replace('raise ValueError("enough")', "place + 1.0").replace("    for k", "    place = s.bodies.position\n    for k")
         two = self.play("raised3", HEAP, stale, ranks=2, status=4)
         self.assertIn("StaleArray: this array of bodies is of a step that is over", two.stderr)
+        # what one rank gets wrong is an error of that rank alone
+        wrong = script.replace('raise ValueError("enough")', "s.bodies.velocity = np.zeros((1, 7))")
+        two = self.play("raised4", HEAP, wrong, ranks=2, status=4)
+        self.assertIn("an array of shape (1, 7)", two.stderr)
+        # the same of a script without a block
+        bare = "s = gravier.Simulation(case)\n" + script.replace("    ", "", 1).split("s:\n")[1].replace("\n    ", "\n")
+        two = self.play("raised5", HEAP, bare, ranks=2, status=4)
+        self.assertIn("ValueError: enough", two.stderr)
 
     def test_the_library_is_missed_in_one_line(self):
         script = "import gravier\ntry:\n    gravier.Simulation('case.nml')\nexcept gravier.SimulationError as error:\n    print(error)\n"

@@ -5,7 +5,7 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, each, merged, run_case, write
+from gravier_runs import RunTestCase, contents, differences, each, merged, run_case, write
 from small_scenes import Grain, Record, bodies_csv, plane
 
 TOLERANCE = 1e-4
@@ -71,6 +71,38 @@ class Sleeping(RunTestCase):
         results = run.results()
         rise = results[f"/steps/{round(end / 1e-3)}/bodies/position"][:, 1] - results["/steps/0/bodies/position"][:, 1]
         self.assertLess(np.abs(rise / (speed * (end - begin)) - 1.0).max(), 0.05)
+
+    def test_contacts_at_an_early_end(self):
+        """A plate pushes a disk along until the run ends by it, beside a column that sleeps: all contacts are written as in the middle of
+        the last step, as they are where nothing sleeps."""
+        disks = [Grain([3.0, (2 * k + 1) * RADIUS], radius=RADIUS, mass=1.0) for k in range(3)]
+        disks.append(Grain([0.5 + RADIUS, RADIUS], radius=RADIUS, mass=1.0))
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": write(f"{self.scratch}/pushed.csv", bodies_csv(disks))},
+            "boundary": [plane([0, 0], [0, 1]), {**plane([0.5, 0], [1, 0]), "name": "plate", "velocity": [0.1, 0.0]}],
+            "time": {"step": 1e-3, "steps": 1000, "stop_boundary": "plate", "stop_displacement": 0.02},
+            "solver": {"accuracy": 1e-6},
+            "output": {"directory": "results", "every": 1000, "contacts": True},
+        }
+        gaps = []
+        for name, more in (("awake", {}), ("asleep", SLEEPING)):
+            run = run_case(merged(case, more), 1, f"{self.scratch}/pushed {name}")
+            self.assert_status(run, 0)
+            self.assertEqual(run.history()["sleeping"][-1], 3 * len(more))
+            gaps.append(run.results()[f"/steps/{int(run.history()['step'][-1])}/contacts/gap"])
+        self.assertEqual(len(gaps[0]), 5)
+        self.assertLess(np.abs(gaps[1] - gaps[0]).max(), 1e-9)
+
+    def test_the_problem_of_all_contacts_on_ranks(self):
+        """What is left out comes back into the file of FCLIB, with bodies that ranks share."""
+        files = []
+        for ranks in (1, 2):
+            case = merged(self.case, SLEEPING, {"time": {"steps": 202}, "output": {"fclib_step": 201, "checkpoint_every": 0}})
+            run = run_case(case, ranks, f"{self.scratch}/problem {ranks}")
+            self.assert_status(run, 0)
+            self.assertGreater(run.history()["sleeping"][200], 100)
+            files.append(contents(run.path("results", "step_201.hdf5")))
+        self.assertEqual(differences(*files), [])
 
     def test_falling_disk(self):
         """The heap that is hit wakes, the other one sleeps on, and both come to the places that they have without sleep."""

@@ -9,15 +9,17 @@ from pathlib import Path
 from .case import find_program
 
 NAME = "libgravier.so"
+#: functions that all ranks call, whose errors all of them have
+COLLECTIVE = ("open", "step", "stop", "checkpoint")
 
 
 class SimulationError(Exception):
     """One line: what was found and what was expected. `status` is the exit status that the program would have: 2 for bad input or a wrong
-    call, 4 for anything else."""
+    call, 4 for anything else. `of_all_ranks`: every rank has raised it, in a call that all of them make."""
 
-    def __init__(self, message, status=2):
+    def __init__(self, message, status=2, of_all_ranks=False):
         super().__init__(message)
-        self.status = status
+        self.status, self.of_all_ranks = status, of_all_ranks
 
 
 def find_library():
@@ -67,4 +69,4 @@ def call(name, *arguments):
     library = load()
     status = getattr(library, "gravier_" + name)(*arguments)
     if status:
-        raise SimulationError(library.gravier_error().decode(errors="replace"), status)
+        raise SimulationError(library.gravier_error().decode(errors="replace"), status, name in COLLECTIVE)

@@ -305,7 +305,7 @@ class Simulation:
         sys.stdout.flush()
         call("open", os.fsencode(case), command, options, number, ctypes.byref(self._handle))
         # a script that ends without close
-        atexit.register(self.close)
+        atexit.register(self._leave)
         self.dimension, self.rank, self.ranks = self.whole("dimension"), self.whole("rank"), self.whole("ranks")
         #: bodies by subdomain of this rank, bodies of this rank, boundaries by name
         self.subdomains = [Subdomain(self, k) for k in range(self.whole("subdomains"))]
@@ -319,11 +319,9 @@ class Simulation:
     def __exit__(self, kind, error, trace):
         if self._handle is None:
             return
-        if error is not None and not isinstance(error, SimulationError) and self.ranks > 1:
-            # the other ranks wait for this one
+        if self._is_alone(error):
             traceback.print_exception(kind, error, trace)
-            sys.stderr.flush()
-            load().gravier_abort()
+            self._abort()
         try:
             if error is not None and self.goes_on:
                 self.stop(f"an exception in its loop, {kind.__name__}")
@@ -331,6 +329,21 @@ class Simulation:
         except SimulationError:
             if error is None:
                 raise
+
+    def _is_alone(self, error):
+        """Whether this rank may be the only one with an exception: the others wait for it in their next call of all ranks."""
+        return error is not None and self.ranks > 1 and not getattr(error, "of_all_ranks", False)
+
+    @staticmethod
+    def _abort():
+        sys.stderr.flush()
+        load().gravier_abort()
+
+    def _leave(self):
+        """At the end of a script that has not closed the run: an exception that ended it has been printed."""
+        if self._is_alone(getattr(sys, "last_value", None)):
+            self._abort()
+        self.close()
 
     @property
     def handle(self):
@@ -369,14 +382,14 @@ class Simulation:
         interrupted. An error of the run is raised."""
         if self._handle is None:
             return self.status
-        atexit.unregister(self.close)
+        atexit.unregister(self._leave)
         self._made = self.made
         handle, self._handle = self._handle, None
         self.mark += 1
         self.status = load().gravier_close(handle)
         line = load().gravier_error().decode(errors="replace")
         if line:
-            raise SimulationError(line, self.status)
+            raise SimulationError(line, self.status, True)
         return self.status
 
     goes_on = property(lambda self: bool(self.whole("goes_on")), doc="there is a step to make")

@@ -49,6 +49,7 @@ module gravier_decomposition
     procedure :: layout => decomposition_layout
     procedure :: find_owned => decomposition_find_owned
     procedure :: free_mass => decomposition_free_mass
+    procedure :: take_forces => decomposition_take_forces
   end type decomposition_t
 
 contains
@@ -106,6 +107,17 @@ contains
     h = narrow(key(1)) - self%first + 1
     place = find_sorted(self%owned(h)%id, key(2))
   end subroutine decomposition_find_owned
+
+  !> Give all grains an applied force, of 0. The same on every rank.
+  subroutine decomposition_take_forces(self)
+    class(decomposition_t), intent(inout) :: self
+    integer :: s
+
+    self%na = self%nd
+    do s = 1, size(self%owned)
+      call self%owned(s)%take_forces()
+    end do
+  end subroutine decomposition_take_forces
 
   !> Mass of the grains that are not glued to boundaries [kg]. Collective.
   real(dp) function decomposition_free_mass(self) result(mass)

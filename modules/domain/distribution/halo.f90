@@ -68,6 +68,7 @@ module gravier_halo
     procedure :: refresh => halo_refresh
     procedure :: are_due => halo_are_due
     procedure :: drop => halo_drop
+    procedure :: take_forces => halo_take_forces
   end type halo_t
 
 contains
@@ -480,5 +481,16 @@ contains
       way = now%surface%way(before%surface)
     end if
   end function way_of
+
+  !> Give all local bodies an applied force, of 0, where there are any yet.
+  subroutine halo_take_forces(self)
+    class(halo_t), intent(inout) :: self
+    integer :: s
+
+    if (.not. allocated(self%view)) return
+    do s = 1, size(self%view)
+      call self%view(s)%bodies%take_forces()
+    end do
+  end subroutine halo_take_forces
 
 end module gravier_halo
