@@ -3,6 +3,7 @@ module gravier_sparse_exchange
   use mpi_f08, only: MPI_Request, MPI_Status, MPI_INTEGER8, MPI_ANY_SOURCE, MPI_STATUS_IGNORE, MPI_STATUSES_IGNORE, &
     & MPI_Issend, MPI_Iprobe, MPI_Recv, MPI_Testall, MPI_Ibarrier, MPI_Test, MPI_Get_count
   use gravier_kinds, only: i8
+  use gravier_narrow, only: narrow
   use gravier_communicator, only: communicator_t
   use gravier_sorting, only: argsort
   implicit none
@@ -100,7 +101,7 @@ contains
         call keep(comm%rank, own)
       else
         n_sends = n_sends + 1
-        call MPI_Issend(outgoing(:, first(i):last(i)), size(outgoing, 1)*(last(i) - first(i) + 1), MPI_INTEGER8, &
+        call MPI_Issend(outgoing(:, first(i):last(i)), narrow(size(outgoing, 1, i8)*(last(i) - first(i) + 1)), MPI_INTEGER8, &
           & target_rank(first(i)), tags(comm%exchanges), comm%mpi, requests(n_sends))
       end if
     end do

@@ -27,8 +27,10 @@ module gravier_step_figures
     !> grains that have entered, and their mass [kg]
     integer(i8) :: entered = 0
     real(dp) :: entered_mass = 0.0_dp
-    !> the neighbour lists were made anew; space was divided anew, or should have been but the scene fills too few cells
-    logical :: listed = .false., divided = .false., refused = .false.
+    !> the neighbour lists were made anew; space was divided anew, or should have been
+    logical :: listed = .false., divided = .false.
+    !> why the old partition stays where space should have been divided anew
+    character(len=:), allocatable :: refusal
     !> seconds in sweeps since the partition before this one, the most over the mean, of the ranks and of the subdomains; where
     !> space was divided anew
     real(dp) :: rank_balance = 1.0_dp, subdomain_balance = 1.0_dp

@@ -451,7 +451,7 @@ contains
     remembered = self%halo%memory%words() > 0 .and. self%halo%builds > 0
     ! the problem of the last step is built anew below: its memory is free for the lists
     if (allocated(self%problem%sub)) deallocate (self%problem%sub)
-    if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refused)
+    if (figures%divided) call repartition(self%division, self%halo, self%decomposition, figures%refusal)
     call self%decomposition%migrate()
     if (remembered) call move_alloc(self%halo%view, before)
     call self%halo%build(self%decomposition)

@@ -395,8 +395,8 @@ contains
 
     if (figures%divided) call warn(self, note_balance, 1_i8, "balance     "// &
       & balance_text(figures%rank_balance, figures%subdomain_balance)//", until this partition", error)
-    if (figures%refused) call warn(self, warn_partition, 1_i8, "warning     the grains fill fewer cells than there are "// &
-      & "subdomains, and the old partition is kept", error)
+    if (allocated(figures%refusal)) call warn(self, warn_partition, 1_i8, "warning     space cannot be divided anew, and the "// &
+      & "old partition is kept: "//figures%refusal, error)
     if (figures%fast > 0) call warn(self, warn_fast, figures%fast, "warning     "// &
       & fast_warning(simulation, figures%fast, simulation%step), error)
     if (figures%deep%number > 0) call warn(self, warn_deep, figures%deep%number, "warning     "// &

@@ -46,6 +46,19 @@ class Commands(RunTestCase):
                          "repartition_every", "direction_unit", "cg_tolerance", "directory", "every", "trace"):
             self.assertIn(expected, run.stdout)
 
+    def test_a_partition_that_cannot_be(self):
+        """A scene that shrinks until it fills fewer cells than there are subdomains keeps its partition, and says why."""
+        rows = [f"{k + 1},0.01,1.0,{k % 2},{0.05 * (k // 2)},{10 - 20 * (k % 2)},0" for k in range(4)]
+        bodies = write(self.here("shrinks.csv"), "id,radius,mass,x,y,vx,vy\n" + "\n".join(rows) + "\n")
+        case = {"scene": {"bodies": "file", "bodies_file": bodies, "gravity": [0.0, 0.0]}, "time": {"step": 1e-3, "steps": 52},
+                "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 64, "repartition_every": 10}}
+        for ranks in (1, 2):
+            run = run_case(case, ranks, self.here(f"shrinks {ranks}"))
+            self.assert_status(run, 0)
+            self.assertIn("warning     space cannot be divided anew, and the old partition is kept: &decomposition subdomains = 64: more "
+                          "subdomains than detection cells; expected at most 8 for this scene\n", run.stdout)
+            self.assertIn("warnings    partitions refused 2\n", run.stdout)
+
     def test_check(self):
         directory = self.here("check")
         os.makedirs(directory)

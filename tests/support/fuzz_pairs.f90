@@ -5,7 +5,7 @@ module gravier_fuzz_pairs
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, place_a, place_b
   use gravier_errors, only: error_t
   use gravier_polyhedra, only: draws_t, turn_t, vector_t, vec, about, between, random_turn
-  use gravier_polyhedron, only: make_polyhedron
+  use gravier_simple_shapes, only: make_polyhedron
   use gravier_shape_library, only: body_shape_t
   implicit none
   private

@@ -5,7 +5,7 @@ module gravier_polyhedra
   use gravier_random_hash, only: hash_uniform
   use gravier_rotation, only: make_rotation
   use gravier_convex_distance, only: placed_pair_t
-  use gravier_polyhedron, only: make_box, make_capsule
+  use gravier_simple_shapes, only: make_box, make_capsule
   use gravier_shape_library, only: body_shape_t
   use gravier_check, only: check
   implicit none

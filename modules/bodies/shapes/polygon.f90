@@ -7,7 +7,7 @@ module gravier_polygon
   use gravier_shape_library, only: body_shape_t
   implicit none
   private
-  public :: flat_piece_t, polygon_piece, round_piece, make_flat_shape, make_polygon
+  public :: flat_piece_t, polygon_piece, round_piece, make_flat_shape
 
   real(dp), parameter :: pi = acos(-1.0_dp)
   !> sine of the least angle between neighbouring sides of a polygon, and the least side over the largest extension
@@ -123,22 +123,6 @@ contains
       shape%piece(k)%rounding = shape%piece(k)%rounding/size_of
     end do
   end subroutine make_flat_shape
-
-  !> A body that is one convex polygon.
-  pure subroutine make_polygon(name, corners, rounding, shape, message)
-    character(len=*), intent(in) :: name
-    !> (2, n) in either sense of rotation, in any unit of length
-    real(dp), intent(in) :: corners(:, :)
-    !> of the corners, in the same unit
-    real(dp), intent(in) :: rounding
-    type(body_shape_t), intent(out) :: shape
-    !> why there is no such polygon, without a full stop; empty where there is
-    character(len=:), allocatable, intent(out) :: message
-    type(flat_piece_t) :: made(1)
-
-    call polygon_piece(corners, rounding, made(1), message)
-    if (len(message) == 0) call make_flat_shape(name, made, shape)
-  end subroutine make_polygon
 
   !> Area, below 0 for corners in clockwise order, centroid and moment of a polygon.
   pure subroutine measure(corner, made)

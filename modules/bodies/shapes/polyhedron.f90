@@ -8,15 +8,13 @@ module gravier_polyhedron
   use gravier_convex_hull, only: find_hull
   use gravier_closed_surface, only: merge_points, check_closed_convex
   use gravier_convex_piece, only: convex_piece_t, find_candidates, list_faces
-  use gravier_mass_properties, only: mass_t, mass_of_polyhedron, mass_of_capsule, mass_of_sum, find_principal_axes
+  use gravier_mass_properties, only: mass_t, mass_of_polyhedron, mass_of_capsule, find_principal_axes
   use gravier_rounded_core, only: find_core
   use gravier_shape_library, only: body_shape_t
   use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_spatial, only: extent_of, turn_back
-  use gravier_union_grid, only: mass_on_grid
   implicit none
   private
-  public :: make_polyhedron, make_polyhedron_of_faces, make_box, make_capsule, make_union, make_overlapping_union
   public :: make_piece, make_piece_of_faces, make_capsule_piece, make_shape
 
   !> features of a piece (vertices, sides of faces, faces) that a contact can name
@@ -26,111 +24,8 @@ module gravier_polyhedron
 
 contains
 
-  !> A body that is the convex hull of points, with round edges. Failures (status_input): fewer than 4 points, all in one plane, a
-  !> rounding that is 0 or as large as the distance from the centre of mass to a face, too many corners.
-  subroutine make_polyhedron(name, points, rounding, shape, error)
-    !> for messages, and the name of the shape
-    character(len=*), intent(in) :: name
-    !> (3, n)
-    real(dp), intent(in), contiguous :: points(:, :)
-    !> in the unit of the points
-    real(dp), intent(in) :: rounding
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-    type(convex_piece_t) :: piece(1)
-    type(mass_t) :: mass
-
-    call make_piece(name, points, rounding, piece(1), mass, error)
-    call make_shape(name, piece, mass, shape, error)
-  end subroutine make_polyhedron
-
-  !> A body with the faces of a closed surface. Failures (status_input) beside those above: the surface is not closed, has no
-  !> volume, is inside out or not convex, or has a face without area.
-  subroutine make_polyhedron_of_faces(name, surface, rounding, shape, error)
-    character(len=*), intent(in) :: name
-    !> its corners and faces; corners at one place become one, and planes are not read
-    type(sharp_polyhedron_t), intent(in) :: surface
-    real(dp), intent(in) :: rounding
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-    type(convex_piece_t) :: piece(1)
-    type(mass_t) :: mass
-
-    call make_piece_of_faces(name, surface, rounding, piece(1), mass, error)
-    call make_shape(name, piece, mass, shape, error)
-  end subroutine make_polyhedron_of_faces
-
-  !> A box with the axes of coordinates.
-  subroutine make_box(name, sides, rounding, shape, error)
-    character(len=*), intent(in) :: name
-    !> lengths along the axes, and the rounding in their unit
-    real(dp), intent(in) :: sides(3), rounding
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: points(3, 8)
-    integer :: k, d
-
-    if (allocated(error)) return
-    if (.not. all(sides > 0.0_dp)) then
-      call raise(error, status_input, name//": a side of "//to_text(minval(sides))//", but one above 0 was expected")
-      return
-    end if
-    do k = 1, 8
-      do d = 1, 3
-        points(d, k) = sides(d)*(ibits(k - 1, d - 1, 1) - 0.5_dp)
-      end do
-    end do
-    call make_polyhedron(name, points, rounding, shape, error)
-  end subroutine make_box
-
-  !> A capsule: a cylinder with half-balls at its ends, along the third axis; a sphere where the length is 0.
-  subroutine make_capsule(name, length, radius, shape, error)
-    character(len=*), intent(in) :: name
-    !> of the cylinder, between the centres of the half-balls
-    real(dp), intent(in) :: length
-    real(dp), intent(in) :: radius
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-    type(convex_piece_t) :: piece(1)
-    type(mass_t) :: mass
-    real(dp) :: ends(3, 2)
-
-    ends(:, :) = 0.0_dp
-    ends(3, 1) = -0.5_dp*length
-    ends(3, 2) = 0.5_dp*length
-    call make_capsule_piece(name, ends, radius, piece(1), mass, error)
-    call make_shape(name, piece, mass, shape, error)
-  end subroutine make_capsule
-
-  !> A body of several pieces that touch but do not overlap: its mass, centre and inertia are the sums of theirs.
-  subroutine make_union(name, pieces, masses, shape, error)
-    character(len=*), intent(in) :: name
-    !> in common axes, as make_piece and its like give them
-    type(convex_piece_t), intent(in) :: pieces(:)
-    type(mass_t), intent(in) :: masses(:)
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-
-    call make_shape(name, pieces, mass_of_sum(masses), shape, error)
-  end subroutine make_union
-
-  !> A body of several pieces that may overlap, as spheres of a cluster do: its mass, centre and inertia are integrals along
-  !> parallel lines through the pieces, which gravier_union_grid describes with their error.
-  subroutine make_overlapping_union(name, pieces, lines, shape, error)
-    character(len=*), intent(in) :: name
-    type(convex_piece_t), intent(in) :: pieces(:)
-    !> along the longer side of the grid of lines, at least 10
-    integer, intent(in) :: lines
-    type(body_shape_t), intent(out) :: shape
-    type(error_t), allocatable, intent(inout) :: error
-
-    if (allocated(error)) return
-    if (lines < 10) call raise(error, status_input, name//": "//to_text(lines)//" lines of a grid, but 10 or more were expected")
-    if (allocated(error)) return
-    call make_shape(name, pieces, mass_on_grid(pieces, lines), shape, error)
-  end subroutine make_overlapping_union
-
-  !> The rounded hull of points as a piece, in their unit and axes, and its mass. Failures as of make_polyhedron.
+  !> The rounded hull of points as a piece, in their unit and axes, and its mass. Failures (status_input): fewer than 4 points, all
+  !> in one plane, a rounding that is 0 or as large as the distance from the centre of mass to a face, too many corners.
   subroutine make_piece(name, points, rounding, piece, mass, error)
     character(len=*), intent(in) :: name
     real(dp), intent(in), contiguous :: points(:, :)
@@ -153,7 +48,8 @@ contains
     if (len(message) > 0) call raise(error, status_input, name//": "//message)
   end subroutine make_piece
 
-  !> The same of a closed surface. Failures as of make_polyhedron_of_faces.
+  !> The same of a closed surface, whose corners at one place become one, and whose planes are not read. Failures (status_input)
+  !> beside those above: the surface is not closed, has no volume, is inside out or not convex, or has a face without area.
   subroutine make_piece_of_faces(name, surface, rounding, piece, mass, error)
     character(len=*), intent(in) :: name
     type(sharp_polyhedron_t), intent(in) :: surface

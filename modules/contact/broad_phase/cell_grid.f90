@@ -17,7 +17,6 @@ module gravier_cell_grid
   contains
     procedure :: init => cell_grid_init
     procedure :: locate => cell_grid_locate
-    procedure :: index_of => cell_grid_index_of
     procedure :: cells => cell_grid_cells
     procedure :: flat => cell_grid_flat
   end type cell_grid_t
@@ -92,14 +91,6 @@ contains
     integer, intent(in) :: place(3)
     cell = 1 + place(1) + self%n(1)*(place(2) + self%n(2)*place(3))
   end function cell_grid_flat
-
-  pure integer function cell_grid_index_of(self, point) result(cell)
-    class(cell_grid_t), intent(in) :: self
-    real(dp), intent(in) :: point(:)
-    integer :: place(3)
-    call self%locate(point, place)
-    cell = self%flat(place)
-  end function cell_grid_index_of
 
   !> Number of cells.
   pure integer function cell_grid_cells(self) result(cells)

@@ -88,13 +88,14 @@ contains
 
   end subroutine divide
 
-  !> Divide space anew; where the scene has come to fill fewer cells than there are subdomains, the old partition
-  !> stays. Collective.
-  subroutine repartition(rule, halo, decomposition, refused)
+  !> Divide space anew; where that cannot be, as in a scene that has come to fill fewer cells than there are subdomains, the old
+  !> partition stays. Collective.
+  subroutine repartition(rule, halo, decomposition, refusal)
     type(repartition_rule_t), intent(in) :: rule
     type(halo_t), intent(in) :: halo
     type(decomposition_t), intent(inout) :: decomposition
-    logical, intent(out) :: refused
+    !> why it stays; not allocated where space was divided
+    character(len=:), allocatable, intent(out) :: refusal
     type(body_set_t), allocatable :: bodies(:)
     type(partition_t) :: old
     type(error_t), allocatable :: error
@@ -103,8 +104,9 @@ contains
     call move_alloc(decomposition%owned, bodies)
     call divide(rule, halo, bodies, decomposition, error)
     call move_alloc(bodies, decomposition%owned)
-    refused = allocated(error)
-    if (refused) decomposition%partition = old
+    if (.not. allocated(error)) return
+    refusal = error%message
+    decomposition%partition = old
   end subroutine repartition
 
   !> What a subdomain has to carry: grains, and as far as they are known near pairs, at their candidates.

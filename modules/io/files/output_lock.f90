@@ -8,7 +8,7 @@ module gravier_output_lock
   use gravier_process, only: pause_for
   use gravier_text, only: to_text, shell_word
   use gravier_communicator, only: communicator_t
-  use gravier_file_system, only: place_of, place_of_open, is_device, host_name, remove_file
+  use gravier_file_system, only: place_t, place_of, place_of_open, is_device, host_name, remove_file
   use gravier_system_calls, only: c_close, c_fcntl, c_ftruncate, c_getpid, c_open, c_read, c_write, c_text, &
     & last_error, reason, range_lock_t, set_lock, lock_exclusive, lock_shared, o_rdonly, o_rdwr, o_creat, o_cloexec, &
     & file_mode, eacces, eagain, eintr, enolck, enosys, eopnotsupp
@@ -119,6 +119,7 @@ contains
   subroutine try(self, number)
     type(output_lock_t), intent(inout) :: self
     integer(c_int), intent(out) :: number
+    type(place_t) :: opened
     integer(c_int) :: ignored
 
     do
@@ -129,9 +130,11 @@ contains
         return
       end if
       number = lock_bytes(self%descriptor, lock_exclusive, byte_of_root, 2_c_int64_t)
-      ! a program that has ended meanwhile has removed the file: others do not see a lock on that one
+      ! a program that has ended meanwhile has removed the file: others do not see a lock on that one, where the system tells
       if (number == 0) then
-        if (place_of_open(self%descriptor) == place_of(self%path)) exit
+        opened = place_of_open(self%descriptor)
+        if (.not. opened%is_there()) exit
+        if (opened == place_of(self%path)) exit
       end if
       ignored = c_close(self%descriptor)
       self%descriptor = -1

@@ -5,7 +5,7 @@ module gravier_system_calls
   implicit none
   private
   public :: c_access, c_mkdir, c_rename, c_unlink, c_rmdir, c_open, c_creat, c_close, c_write, c_lseek, c_fsync, c_ftruncate
-  public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink, c_errno_location, c_strerror
+  public :: c_fallocate, c_fstatvfs, c_glob, c_globfree, c_getpid, c_isatty, c_readlink
   public :: c_strlen, c_read, c_fcntl, c_statx, c_gethostname, c_window_size
   public :: ask_window_size, o_rdonly, o_wronly, o_rdwr, o_creat, o_nonblock, o_cloexec, file_mode, directory_mode
   public :: falloc_fl_keep_size, falloc_fl_punch_hole, seek_set, seek_end, statvfs_words, glob_words

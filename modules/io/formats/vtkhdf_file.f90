@@ -83,7 +83,6 @@ contains
     if (allocated(error)) return
     call set_up(self, comm, path, table)
     self%chunk = min(max(least_chunk, expected/chunks_in_block), greatest_chunk)
-    if (comm%rank == 0) call remove_file(path)
     call self%file%create(comm, path, error, chunks_in_block)
     call self%file%reserve(bytes_of_headers, error)
     call self%file%make_group(root, error)
@@ -91,7 +90,12 @@ contains
     call self%file%write_attribute(root, "Type", "PolyData", error)
     call make_tables(self, error, check=.false.)
     call self%file%flush(error)
-    if (allocated(error)) call self%file%discard()
+    if (allocated(error)) then
+      call self%file%discard()
+    else if (comm%rank == 0) then
+      ! the new file is shown once it has steps: until then none is there
+      call remove_file(path)
+    end if
   end subroutine vtkhdf_open
 
   !> Note what the file is made of.

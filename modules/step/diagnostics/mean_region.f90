@@ -23,7 +23,6 @@ module gravier_mean_region
     !> axis along which there are bins, and how many; 0: none
     integer :: axis = 0, bins = 0
   contains
-    procedure :: n_bins => mean_region_n_bins
     procedure :: make_grid => mean_region_make_grid
   end type mean_region_t
 
@@ -57,12 +56,6 @@ module gravier_mean_region
   end type region_grid_t
 
 contains
-
-  !> Bins of a region; a region without them is one.
-  pure integer function mean_region_n_bins(self) result(n)
-    class(mean_region_t), intent(in) :: self
-    n = max(self%bins, 1)
-  end function mean_region_n_bins
 
   !> The space that the region takes in a scene: sides that it does not have are those of the scene.
   pure subroutine mean_region_make_grid(self, low, high, period, binned, grid)

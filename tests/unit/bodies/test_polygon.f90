@@ -3,7 +3,8 @@ program test_polygon
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t
   use gravier_shape_library, only: body_shape_t, shape_library_t, boundary_number
-  use gravier_polygon, only: flat_piece_t, polygon_piece, round_piece, make_flat_shape, make_polygon
+  use gravier_polygon, only: flat_piece_t, polygon_piece, round_piece, make_flat_shape
+  use gravier_simple_shapes, only: make_polygon
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 

@@ -7,8 +7,8 @@ program test_polyhedron
   use gravier_mass_properties, only: mass_t, find_principal_axes
   use gravier_polyhedra, only: tetrahedron, cube, octahedron, dodecahedron, icosahedron, golden, draws_t, vector_t, turn_t, vec, &
     & about, random_turn
-  use gravier_polyhedron, only: make_polyhedron, make_polyhedron_of_faces, make_box, make_capsule, make_union, &
-    & make_overlapping_union, make_piece, make_capsule_piece
+  use gravier_polyhedron, only: make_piece, make_capsule_piece
+  use gravier_simple_shapes, only: make_polyhedron, make_polyhedron_of_faces, make_box, make_capsule, make_union
   use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
@@ -382,8 +382,8 @@ contains
     type(convex_piece_t) :: pieces(2)
     type(mass_t) :: masses(2)
     type(error_t), allocatable :: error
-    real(dp) :: points(3, 8), ends(3, 2), volume, height, bound
-    integer :: k, n
+    real(dp) :: points(3, 8)
+    integer :: k
 
     call make_box("box", [4.0_dp, 2.0_dp, 1.0_dp], 0.01_dp, whole, error)
     do k = 1, 2
@@ -399,24 +399,6 @@ contains
       call check_close(shape%inertia(k), whole%inertia(k), tight, "two halves: inertia")
     end do
     call check_close(minval(shape%piece(1)%corner(1, :))*shape%size, -2.0_dp, tight, "two halves: place")
-    call make_overlapping_union("box", pieces, 40, shape, error)
-    call check_close(shape%volume, whole%volume, 1.0e-12_dp, "two halves on a grid that fits: volume")
-    ! two balls of radius 1, 0.7 apart: without twice a cap
-    ends(:, :) = 0.0_dp
-    call make_capsule_piece("ball", ends, 1.0_dp, pieces(1), masses(1), error)
-    ends(1, :) = 0.7_dp
-    call make_capsule_piece("ball", ends, 1.0_dp, pieces(2), masses(2), error)
-    height = 1.0_dp - 0.35_dp
-    volume = 8*pi/3 - 2*pi*height**2*(3 - height)/3
-    do n = 20, 120, 10
-      call make_overlapping_union("balls", pieces, n, shape, error)
-      bound = 0.5_dp*real(n, dp)**(-1.5_dp)
-      call check_close(shape%volume*shape%size**3, volume, bound*volume, "two balls: volume")
-      call check_close(shape%inertia(2), shape%inertia(3), tight, "two balls: moments")
-    end do
-    call check_close(shape%size, 1.35_dp, 1.0e-12_dp, "two balls: size")
-    call make_overlapping_union("balls", pieces, 5, shape, error)
-    call check_refused(error, "balls: 5 lines of a grid, but 10 or more were expected")
   end subroutine test_unions
 
 end program test_polyhedron

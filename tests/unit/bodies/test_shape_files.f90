@@ -5,7 +5,7 @@ program test_shape_files
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
   use gravier_obj_file, only: read_obj
-  use gravier_polyhedron, only: make_polyhedron_of_faces
+  use gravier_simple_shapes, only: make_polyhedron_of_faces
   use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t
   use gravier_stl_file, only: read_stl

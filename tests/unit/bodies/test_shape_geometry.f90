@@ -10,7 +10,6 @@ program test_shape_geometry
   use gravier_closed_surface, only: merge_points, check_closed_convex
   use gravier_rounded_core, only: find_core
   use gravier_mass_properties, only: mass_t, mass_of_polyhedron
-  use gravier_union_grid, only: mass_on_grid
   use gravier_known_corners, only: regular_polygon, platonic_solid, random_polygon, random_polyhedron
   use gravier_random_turn, only: random_turn
   use gravier_polyhedron, only: make_piece, make_capsule_piece
@@ -33,7 +32,6 @@ program test_shape_geometry
   call test_closed_surfaces()
   call test_core_of_cube()
   call test_core_of_roof()
-  call test_union()
   call test_widths()
   call test_known_corners()
   call test_random_corners()
@@ -319,43 +317,6 @@ contains
     end do
     call check_equal(n, 2, "both ends of the ridge have the top behind them")
   end subroutine test_core_of_roof
-
-  !> Two cubes that overlap are a box; two balls that do not overlap are two balls.
-  subroutine test_union()
-    integer, parameter :: n = 20
-    real(dp), parameter :: lost = 1.0_dp/n**2
-    real(dp) :: points(3, 8), ends(3, 2)
-    type(convex_piece_t) :: pieces(2)
-    type(error_t), allocatable :: error
-    type(mass_t) :: mass, one
-    real(dp) :: volume
-
-    points(:, :) = cube()
-    call make_piece("cube", points, 0.1_dp, pieces(1), one, error)
-    call check_close(one%volume, 8.0_dp, tight, "the volume of a cube")
-    points(1, :) = points(1, :) + 1.0_dp
-    call make_piece("cube", points, 0.1_dp, pieces(2), one, error)
-    mass = mass_on_grid(pieces, n)
-    call check_close(mass%volume, 12.0_dp, 100*tight, "a box: volume")
-    call check_close(mass%centre(1), 0.5_dp, 100*tight, "a box: centre")
-    ! along the lines integrals are exact, across them squares lose a share
-    call check_close(mass%inertia(1, 1), 8.0_dp*(1.0_dp - lost), 1000*tight, "a box: first moment")
-    call check_close(mass%inertia(2, 2), 9.0_dp + 4.0_dp*(1.0_dp - lost), 1000*tight, "a box: second moment")
-    call check_close(mass%inertia(3, 3), 9.0_dp + 4.0_dp*(1.0_dp - lost), 1000*tight, "a box: third moment")
-    call check_close(mass%inertia(1, 2), 0.0_dp, 1000*tight, "a box: its axes are principal")
-    mass = mass_on_grid(pieces(1:1), n)
-    call check_close(mass%volume, 8.0_dp, 100*tight, "one piece alone")
-    ends(:, :) = 0.0_dp
-    call make_capsule_piece("ball", ends, 1.0_dp, pieces(1), one, error)
-    ends(2, :) = 3.0_dp
-    call make_capsule_piece("ball", ends, 1.0_dp, pieces(2), one, error)
-    mass = mass_on_grid(pieces, 400)
-    volume = 8*pi/3
-    call check_close(mass%volume, volume, 0.5_dp/400**1.5_dp*volume, "two balls: volume")
-    call check_close(mass%centre(2), 1.5_dp, 1.0e-4_dp, "two balls: centre")
-    call check_close(mass%inertia(2, 2), 0.4_dp*volume, 0.5_dp/400**1.5_dp*mass%inertia(2, 2), "two balls: about their line")
-    call check_close(mass%inertia(1, 1), (0.4_dp + 2.25_dp)*volume, 1.0e-4_dp*volume, "two balls: across it")
-  end subroutine test_union
 
   !> Half of the least width: between two faces of a cube and of an octahedron, between two edges of a tetrahedron, between a side
   !> and a corner of a triangle, and of roundings alone.

@@ -5,7 +5,7 @@ program test_shapes_file
   use gravier_errors, only: error_t, status_input
   use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   use gravier_shape_library, only: body_shape_t, shape_library_t
-  use gravier_polyhedron, only: make_polyhedron_of_faces
+  use gravier_simple_shapes, only: make_polyhedron_of_faces
   use gravier_shape_names, only: find_shape, shape_names, library_digest
   use gravier_shapes_file, only: parse_shapes
   use gravier_text, only: to_text

@@ -15,7 +15,7 @@ program test_convex_contact
   use gravier_edge_patch, only: add_edge_points
   use gravier_face_patch, only: add_face_points
   use gravier_manifold, only: feature_base, most_points
-  use gravier_polyhedron, only: make_polyhedron
+  use gravier_simple_shapes, only: make_polyhedron
   use gravier_shape_library, only: body_shape_t
   use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair, make_box_rod_ball, &
     & half => half_core, straight

@@ -6,7 +6,7 @@ program test_core_overlap
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, place_a, place_b
   use gravier_core_overlap, only: find_least_separation
-  use gravier_polyhedron, only: make_capsule, make_polyhedron
+  use gravier_simple_shapes, only: make_capsule, make_polyhedron
   use gravier_shape_library, only: body_shape_t
   use gravier_polyhedra, only: draws_t, vector_t, turn_t, random_turn, about, vec, put_pair, make_box_rod_ball, &
     & half => half_core, straight

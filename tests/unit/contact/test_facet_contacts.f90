@@ -6,7 +6,7 @@ program test_facet_contacts
   use gravier_facet, only: near_facets_t
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: core_distance_t
-  use gravier_polyhedron, only: make_polyhedron
+  use gravier_simple_shapes, only: make_polyhedron
   use gravier_shape_library, only: body_shape_t, shape_library_t, point_counts_t
   use gravier_polygon_pair, only: placed_piece_t, place_piece, find_plane_manifold
   use gravier_polyhedron_pair, only: find_halfspace_manifold

@@ -6,7 +6,7 @@ program test_polyhedron_pair
   use gravier_convex_piece, only: convex_piece_t
   use gravier_convex_distance, only: placed_pair_t
   use gravier_manifold, only: manifold_t, most_points, feature_base
-  use gravier_polyhedron, only: make_polyhedron, make_box, make_capsule
+  use gravier_simple_shapes, only: make_polyhedron, make_box, make_capsule
   use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
   use gravier_polyhedra, only: draws_t, random_turn, vector_t, turn_t, vec, about, back, on, between, inverse
   use gravier_shape_library, only: body_shape_t

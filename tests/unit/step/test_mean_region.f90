@@ -82,7 +82,6 @@ contains
     region%upper(1) = 2.0_dp
     region%axis = 2
     region%bins = 3
-    call check_equal(region%n_bins(), 3, "bins")
     grid = grid_of(region, 2, 0.0_dp)
     call check_close(grid%volume, 0.5_dp, rounding, "volume of a bin")
     call check_close(grid%side(0), 0.25_dp, 0.0_dp, "first side")
