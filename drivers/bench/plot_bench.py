@@ -57,7 +57,7 @@ def draw_kernels(rows, axes):
             limits = [bandwidth / cases[name]["bytes_per_relaxation"][0] / 1e6 for name in names]
             axes.hlines(limits, [n - 0.45 for n in range(len(names))], [n + 0.45 for n in range(len(names))], color="#D55E00",
                         label="triad over bytes streamed")
-    axes.set_xticks(range(len(names)), [name.replace("_", "\n") for name in names], fontsize=6.5)
+    axes.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], fontsize=7, rotation=40, ha="right", rotation_mode="anchor")
     axes.set_ylabel("relaxations [10$^6$/s], one core")
     axes.legend(frameon=False, fontsize=8)
     axes.grid(True, axis="y", color="0.9", linewidth=0.6)
@@ -73,7 +73,7 @@ def draw_steps(rows, axes):
         axes.bar(range(len(cases)), shares, 0.7, bottom=bottom, color=colour, label=label)
         bottom = [low + share for low, share in zip(bottom, shares)]
     axes.set_xticks(range(len(cases)), [f"{STEPS[group]}\n{size} spheres\n{ranks} rank{'s' * (ranks > 1)}"
-                                        for group, _, size, ranks in cases], fontsize=7)
+                                        for group, _, size, ranks in cases], fontsize=6)
     axes.set_ylabel("share of a step [%]")
     axes.set_ylim(0, 100)
     axes.legend(frameon=False, fontsize=8, ncol=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
