@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from datbox_text import Refused
+from gravier.case import namelist
 from one_line import plain
 
 from whole_file import Misplaced, check_place, give_names, hdf5_file
@@ -17,20 +18,6 @@ PROGRAM = "gravier_import"
 MADE = f"made by {PROGRAM} from"
 #: first line of the table of contacts, which has no comment since other programs read it
 CONTACTS = "candidate,contactor,antagonist,other,status,gap,force_n,force_t,force_s,nx,ny,nz,fx,fy,fz\n"
-
-
-def text_of(value):
-    if isinstance(value, bool):
-        return ".true." if value else ".false."
-    if isinstance(value, str):
-        return "'" + value.replace("'", "''") + "'"
-    if isinstance(value, (list, tuple)):
-        return ", ".join(text_of(entry) for entry in value)
-    return repr(int(value)) if isinstance(value, int) else repr(float(value))
-
-
-def group_text(name, keys):
-    return f"&{name}\n" + "".join(f"  {key} = {text_of(value)}\n" for key, value in keys.items()) + "/\n"
 
 
 def write_bodies(case, path):
@@ -70,8 +57,8 @@ def texts_of(case, stem, options, contacts):
         made[".shapes"] = f"# {origin}" + "".join(f"shape {name}\n{text}" for text, name in case.shapes.items())
     if options.period:
         scene["period"] = options.period
-    parts = [group_text("scene", scene), *(group_text("material", {"name": name}) for name in case.laws.materials),
-             *(group_text("law", {"materials": names, **keys}) for names, keys in case.laws.met.items())]
+    parts = [namelist({"scene": scene}), *(namelist({"material": {"name": name}}) for name in case.laws.materials),
+             *(namelist({"law": {"materials": names, **keys}}) for names, keys in case.laws.met.items())]
     tables = {}
     for keys, columns in case.boundaries:
         if columns:
@@ -82,9 +69,9 @@ def texts_of(case, stem, options, contacts):
             ending = tables.setdefault(text, f"_drive_{len(tables) + 1}.csv")
             made[ending] = f"# {origin}{text}"
             keys = {**keys, "table": stem + ending}
-        parts.append(group_text("boundary", keys))
-    parts += [group_text("time", {"step": options.step, "steps": options.steps}),
-              group_text("output", {"directory": stem + "_results", "every": max(1, options.steps // 10)})]
+        parts.append(namelist({"boundary": keys}))
+    parts.append(namelist({"time": {"step": options.step, "steps": options.steps},
+                           "output": {"directory": stem + "_results", "every": max(1, options.steps // 10)}}))
     made[".nml"] = f"! {origin}" + "\n".join(parts)
     if contacts is not None:
         made["_contacts.csv"] = CONTACTS + "".join(

@@ -24,7 +24,7 @@ def add_pairs(table, name, rows, least):
     plain, momentum = (next(row for row in rows if row["by"] == by) for by in ("plain", "momentum"))
     table.add(f"{name}: plain over accelerated iterations to an error of 0.1", ratio(count(plain, 0.1), count(momentum, 0.1)),
               least, None,
-              f"{ACCELERATION}: 5 to 36; a tenth less")
+              f"{ACCELERATION}: 6 to 28; a quarter less")
     table.add(f"{name}: estimate where the program ends", momentum["program: error"] if momentum["program: converged"] else np.nan,
               None, GOAL,
               CRITERION)

@@ -51,7 +51,7 @@ module gravier_simulation
     real(dp) :: watched_from(3) = 0.0_dp
     !> lengths of the period at the start of the scene [m]
     real(dp) :: first_length(3) = 0.0_dp
-    !> mass of those that are free [kg]
+    !> mass of the free grains of the scene at its start [kg]
     real(dp) :: first_mass = 0.0_dp
     !> step written last in results.h5, -1 for none
     integer :: last_written = -1

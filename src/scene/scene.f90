@@ -17,7 +17,7 @@ module gravier_scene
   use gravier_boundary, only: boundary_t
   use gravier_insertion, only: insertion_t
   use gravier_effects, only: effects_t
-  use gravier_motion, only: grain_mass, grain_inertia
+  use gravier_motion, only: grain_mass
   use gravier_law_set, only: law_set_t
   use gravier_pair_laws, only: set_default_laws
   use gravier_method_choice, only: check_moments
@@ -474,11 +474,7 @@ contains
         mass = grain_mass(grains%nd, radius, density_of(config, data%material(k)))
       end if
       if (grains%nv == grains%nd) return
-      if (number > 0) then
-        grains%inertia(k) = mass*radius**2*maxval(shapes%shape(number)%inertia)
-      else
-        grains%inertia(k) = grain_inertia(grains%nd, radius, mass)
-      end if
+      grains%inertia(k) = shapes%inertia(number, grains%nd, radius, mass)
     end associate
   end subroutine set_mass
 

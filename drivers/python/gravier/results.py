@@ -1,13 +1,12 @@
 """What a run left in its directory, as numpy arrays."""
 import csv
-import re
 from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from .case import CaseError, parse_namelist
+from .case import CaseError, entries, parse_namelist
 from .checksum import is_whole
 from .shapes import axes_of, ball, shapes_of
 
@@ -389,14 +388,7 @@ class Run:
         cell = self.cell(step)
         if cell is not None:
             return cell.edge[::-1]
-        period = np.zeros(self.dimension)
-        for key, value in self.case.get("scene", [{}])[0].items():
-            axis = re.fullmatch(r"period(?:\((\d)\))?", key)
-            if axis:
-                first = int(axis[1] or 1) - 1
-                for place, length in enumerate(np.atleast_1d(np.array(value, dtype=float)), first):
-                    if place < self.dimension and np.isfinite(length):
-                        period[place] = length
+        period = entries(self.case.get("scene", [{}])[0], "period", np.zeros(self.dimension))
         return np.diag(period)[period > 0]
 
     @staticmethod

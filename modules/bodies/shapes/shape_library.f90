@@ -1,6 +1,7 @@
 !> The shapes that bodies of a scene have, each known once and shared by all bodies that have it, at any size.
 module gravier_shape_library
   use gravier_kinds, only: dp
+  use gravier_motion, only: grain_inertia
   use gravier_convex_piece, only: convex_piece_t
   use gravier_piece_width, only: half_width_of
   implicit none
@@ -49,9 +50,25 @@ module gravier_shape_library
   contains
     procedure :: add => shape_library_add
     procedure :: find => shape_library_find
+    procedure :: inertia => shape_library_inertia
   end type shape_library_t
 
 contains
+
+  !> Largest principal moment of inertia of a body [kg m^2].
+  pure real(dp) function shape_library_inertia(self, number, dimension, radius, mass) result(inertia)
+    class(shape_library_t), intent(in) :: self
+    !> of its shape, 0 of a disk or a sphere; of space
+    integer, intent(in) :: number, dimension
+    !> [m], [kg]
+    real(dp), intent(in) :: radius, mass
+
+    if (number > 0) then
+      inertia = mass*radius**2*maxval(self%shape(number)%inertia)
+    else
+      inertia = grain_inertia(dimension, radius, mass)
+    end if
+  end function shape_library_inertia
 
   !> Add a shape to a library; its number is the next one.
   subroutine shape_library_add(self, shape)

@@ -4,7 +4,6 @@
 module gravier_inflow
   use gravier_kinds, only: dp, i8
   use gravier_finite, only: is_finite
-  use gravier_motion, only: grain_inertia
   use gravier_body_store, only: body_set_t, append_bodies
   use gravier_placed_grains, only: sample_box_t, placed_grains_t
   use gravier_insertion, only: insertion_t, new_grain_t, candidates_a_grain, insertion_words
@@ -395,9 +394,7 @@ contains
         bodies%orientation(:, n) = grain%turn(1:bodies%no)
       end if
       if (bodies%nv == nd) return
-      bodies%inertia(n) = grain_inertia(nd, grain%radius, grain%mass)
-      if (grain%shape > 0) bodies%inertia(n) = &
-        & grain%mass*grain%radius**2*maxval(decomposition%shapes%shape(grain%shape)%inertia)
+      bodies%inertia(n) = decomposition%shapes%inertia(grain%shape, nd, grain%radius, grain%mass)
     end associate
   end subroutine set_body
 

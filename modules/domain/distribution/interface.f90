@@ -348,7 +348,8 @@ contains
     end do
   end subroutine reorder_grains
 
-  !> Count the interface. Each grain is counted in the first of the subdomains that share it. Collective.
+  !> Count the contacts of all subdomains, and the interface. Each body is counted in the first of the subdomains that share it.
+  !> Collective.
   subroutine count_figures(decomposition, halo, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
     type(halo_t), intent(in) :: halo
@@ -356,24 +357,21 @@ contains
     type(interface_statistics_t), intent(out) :: figures
     integer(i8) :: counts(n_multiplicities + 7)
     real(dp) :: extremes(4)
-    logical, allocatable :: counted_elsewhere(:)
-    integer :: s, b, c, k, m
+    integer :: s, c, k, m
 
     counts(:) = 0
     extremes(:) = 0.0_dp
     extremes(2) = -huge(1.0_dp)
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), part => problem%shared%part(s))
-        allocate (counted_elsewhere(sub%n_bodies), source=.false.)
+        ! bodies that are shared stand once, and others have one copy
+        counts(1) = counts(1) + sub%n_bodies - part%n_shared
         do k = 1, part%n_shared
-          counted_elsewhere(part%body(k)) = part%copy_rank(k) > 1
-        end do
-        do b = 1, sub%n_bodies
-          if (counted_elsewhere(b)) cycle
-          m = min(sub%multiplicity(b), n_multiplicities)
+          if (part%copy_rank(k) > 1) cycle
+          m = min(sub%multiplicity(part%body(k)), n_multiplicities)
           counts(m) = counts(m) + 1
         end do
-        do c = 1, sub%n_contacts
+        do c = 1, merge(sub%n_contacts, 0, problem%n_subdomains > 1)
           if (any(sub%pair(:, c) > sub%n_grains)) cycle
           if (sub%owner(sub%pair(1, c)) /= sub%owner(sub%pair(2, &
             & c))) counts(n_multiplicities + 1) = counts(n_multiplicities + 1) + 1
@@ -388,7 +386,6 @@ contains
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%overlapping_cores
         counts(n_multiplicities + 7) = counts(n_multiplicities + 7) + sub%stretched_bonds
-        deallocate (counted_elsewhere)
       end associate
     end do
     call decomposition%comm%sum_counts(counts)
