@@ -24,12 +24,13 @@ from oracle_table import Bounds
 from study_support import BINARIES, plt, write_hdf5
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
+from gravier.case import value_text  # noqa: E402
 from whole_file import save_figure, whole_file  # noqa: E402
 
 CASE = """&scene
   dimension = {dimension}
   bodies = 'file'
-  bodies_file = '{bodies}'
+  bodies_file = {bodies}
   friction = 0.3
 /
 &time
@@ -46,7 +47,7 @@ CASE = """&scene
   subdomains = {subdomains}
 /
 &output
-  directory = '{directory}'
+  directory = {directory}
   every = 0
   contacts = .false.
 /
@@ -81,8 +82,8 @@ def run_case(program, bodies, dimension, partition, subdomains):
     with tempfile.TemporaryDirectory() as scratch:
         case = os.path.join(scratch, "case.nml")
         with whole_file(case) as part, open(part, "w", encoding="utf-8") as file:
-            file.write(CASE.format(dimension=dimension, bodies=bodies, partition=partition, subdomains=subdomains,
-                                   directory=os.path.join(scratch, "out")))
+            file.write(CASE.format(dimension=dimension, bodies=value_text(bodies), partition=partition, subdomains=subdomains,
+                                   directory=value_text(os.path.join(scratch, "out"))))
         run = subprocess.run([program, case], capture_output=True, text=True, check=False)
         # one iteration does not converge: status 3
         if run.returncode not in (0, 3):

@@ -107,16 +107,22 @@ contains
   function older_files(config) result(found)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: found
-    character(len=:), allocatable :: names, name
+    character(len=:), allocatable :: own, names, name
+    type(config_t) :: all_asked
     integer :: first
     logical :: exists
 
     found = ""
-    names = file_names(config, wanted=.false.)
+    own = ","//file_names(config, wanted=.true.)//","
+    ! an output of this run may write fewer files than that of the older one
+    all_asked = config
+    all_asked%output%contacts = .true.
+    names = file_names(all_asked, wanted=.true.)//","//file_names(all_asked, wanted=.false.)
     first = 1
     do
       call take_name(names, first, name)
       if (name == "") exit
+      if (index(own, ","//name//",") > 0) cycle
       inquire (file=trim(config%output%directory)//"/"//name, exist=exists)
       if (exists) found = found//", "//name
     end do

@@ -48,9 +48,8 @@ contains
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: names
 
-    associate (unused => config)
-    end associate
-    names = bodies_name//","//contacts_name//","//facets_name
+    names = bodies_name//","//facets_name
+    if (config%output%contacts) names = names//","//contacts_name
   end function picture_output_files
 
   !> Create the files, or go on with those of a run that was interrupted. Collective.

@@ -15,7 +15,7 @@ import gravier_runs  # noqa: F401  puts the package on the path
 import h5py
 import matplotlib.image
 import numpy as np
-from gravier_runs import SOURCE, RunTestCase
+from gravier_runs import SOURCE, RunTestCase, write
 
 import gravier
 
@@ -100,6 +100,13 @@ class Package(RunTestCase):
             run.bodies(7)
         with self.assertRaisesRegex(gravier.ResultsError, "expected the results of a run"):
             gravier.Run(self.here("nowhere"))
+
+    def test_tables_that_are_cut_off(self):
+        """A last row without its end is left out, also where it has as many values; a row within that is short is an error."""
+        for text, expected in (("a,b\n1,2\n3,4", [2.0]), ("a,b\n1,2\n3", [2.0]), ("a,b\n1,2\n3,4\n", [2.0, 4.0]), ("a,b\n", [])):
+            self.assertEqual(list(gravier.read_table(write(self.here("cut.csv"), text)).b), expected)
+        with self.assertRaisesRegex(gravier.ResultsError, "cut.csv: line 3: 1 values; expected 2, as many as names$"):
+            gravier.read_table(write(self.here("cut.csv"), "a,b\n1,2\n3\n5,6\n"))
 
     def test_forces_of_the_chains_carry_the_weight(self):
         """At rest the normal forces on the ground are the weight of the disks, which touch nothing else that could carry: walls

@@ -52,6 +52,10 @@ class LastWords(RunTestCase):
         said = [line(run_case(merged(case, {"output": more}), 1, self.here("older")), "warning     results holds")
                 for more in ({"trace": True, "final_bodies": True}, {}, {"trace": True, "final_bodies": True})]
         self.assertEqual(said, ["", "warning     results holds files of an older run, which stay as they are: trace.csv, final_bodies.h5", ""])
+        said = [line(run_case(merged(case, {"output": more}), 1, self.here("older pictures")), "warning     results holds")
+                for more in ({"vtk": True}, {"vtk": True, "contacts": False}, {})]
+        kept = "warning     results holds files of an older run, which stay as they are: "
+        self.assertEqual(said, ["", kept + "contacts.vtkhdf", kept + "bodies.vtkhdf, contacts.vtkhdf"])
 
     def test_reported_errors(self):
         """What a solve that has converged reports is within the accuracy, also soon after a pass over layers."""

@@ -75,13 +75,15 @@ def read_table(path, columns=()):
     """A CSV file with one row of names: numbers by column. `columns` are those that it must have."""
     try:
         with open(path, newline="", encoding="ascii") as file:
-            header, *rows = list(csv.reader(file)) or [[]]
+            # the last row of a run that is under way or was killed may be cut off
+            header, *rows = list(csv.reader(file.read().rpartition("\n")[0].splitlines())) or [[]]
     except OSError as reason:
         raise ResultsError(f"{path}: {reason.strerror}; expected a table that a run wrote") from None
     except (ValueError, csv.Error) as reason:
         raise ResultsError(f"{path}: {_one_line(reason)}; expected a table that a run wrote") from None
-    # the last row of a run that is under way or was killed may be cut off
-    rows = [row for row in rows if len(row) == len(header)]
+    for line, row in enumerate(rows, 2):
+        if len(row) != len(header):
+            raise ResultsError(f"{path}: line {line}: {len(row)} values; expected {len(header)}, as many as names")
     try:
         values = np.array(rows, dtype=float).reshape(len(rows), len(header))
     except ValueError as reason:
