@@ -6,7 +6,7 @@ module gravier_mass_properties
   use gravier_sharp_polyhedron, only: sharp_polyhedron_t
   implicit none
   private
-  public :: mass_t, mass_of_polyhedron, mass_of_capsule, mass_of_sum, inertia_of_moments, find_principal_axes
+  public :: mass_t, mass_of_polyhedron, mass_of_capsule, mass_of_sum, find_principal_axes
 
   !> A body of density 1; lengths are those of its points.
   type :: mass_t
