@@ -96,6 +96,7 @@ contains
         ! contacts of bodies that sleep come back for whoever writes contacts
         if (any(stage == [after_solve, of_states, of_end])) call simulation%make_whole()
         if (stage == of_checkpoints) call sync(self, error)
+        ! before the first one rank 0 may have an error alone, as of a line of the log
         if (.not. wrote) call self%comm%agree(error)
         call item%write(simulation, figures, seconds, error)
         call self%comm%agree(error)

@@ -72,7 +72,7 @@ def along(parts, axes):
 
 
 def read_table(path, columns=()):
-    """A CSV file with one row of names: numbers by column. `columns` are those that it must have."""
+    """A CSV file with one row of names: numbers by column. `columns` are those that it must have. A last row without its end is left out."""
     try:
         with open(path, newline="", encoding="ascii") as file:
             # the last row of a run that is under way or was killed may be cut off
