@@ -190,7 +190,6 @@ module gravier_config_types
     !> which diagnostics are asked for, in the order of the registry
     logical, allocatable :: diagnostics(:)
   contains
-    procedure :: asks => output_config_asks
     procedure :: ask => output_config_ask
   end type output_config_t
 
@@ -355,17 +354,6 @@ module gravier_config_types
   end type config_t
 
 contains
-
-  !> Whether the diagnostic with that key is asked for.
-  logical function output_config_asks(self, key) result(asked)
-    class(output_config_t), intent(in) :: self
-    character(len=*), intent(in) :: key
-    integer :: place
-
-    place = diagnostic_place(key)
-    asked = .false.
-    if (place > 0) asked = self%diagnostics(place)
-  end function output_config_asks
 
   !> Ask for the diagnostic with that key, where there is one.
   subroutine output_config_ask(self, key)

@@ -92,7 +92,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(scene_t) :: scene
     type(time_table_t) :: none
-    type(error_t), allocatable :: narrow
+    type(error_t), allocatable :: too_long
 
     call keep_heap()
     call self%free()
@@ -113,10 +113,12 @@ contains
     self%inflow%insertions = scene%insertions
     self%inflow%next_id = scene%last_id + 1
     call set_physics(self, scene)
-    call check_lists_in_period(self, scene, narrow)
+    call check_lists_in_period(self, scene, too_long)
     ! lists that last less long have a shorter range
-    if (allocated(narrow)) self%decomposition%rule%most_travel = 0.0_dp
-    if (allocated(narrow)) call check_lists_in_period(self, scene, error)
+    if (allocated(too_long)) then
+      self%decomposition%rule%most_travel = 0.0_dp
+      call check_lists_in_period(self, scene, error)
+    end if
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%method)

@@ -158,6 +158,23 @@ class Package(RunTestCase):
         with self.assertRaisesRegex(gravier.CaseError, "&boundary name: stands several times"):
             list(gravier.study(base, {("boundary", "name"): ["x"]}, self.here("refused")))
 
+    def test_a_run_beside_another(self):
+        """A directory where a run is under way is refused, and what the first one has written stays."""
+        base = {**self.base, "time": {"step": 1e-3, "steps": 2}}
+        place = pathlib.Path(self.here("beside"))
+        gravier.run(base, place)
+        before = {file.name: file.read_bytes() for file in place.iterdir() if file.is_file()}
+        holding = (f"import sys\nsys.path[:0] = {sys.path!r}\nfrom whole_file import output_lock\n"
+                   f"with output_lock({str(place / 'terminal.log')!r}, 'gravier.run'):\n    print(flush=True)\n    input()\n")
+        with subprocess.Popen([sys.executable, "-c", holding], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as other:
+            other.stdout.readline()
+            with self.assertRaisesRegex(gravier.CaseError, "terminal.log: another program writes here: gravier.run, process"):
+                gravier.run({**base, "time": {"step": 1e-3, "steps": 3}}, place)
+            other.communicate("\n")
+        self.assertEqual({file.name: file.read_bytes() for file in place.iterdir() if file.is_file()}, before)
+        with self.assertRaisesRegex(gravier.CaseError, "case.nml: File exists; expected a place for a directory"):
+            gravier.run(base, place / "case.nml")
+
     def test_pictures(self):
         drawn = [("packing", "a.png", ("--dpi", "100")), ("packing", "b.svg", ("--colour", "pressure", "--step", "100")),
                  ("packing", "c.png", ("--colour", "rotation", "--no-chains", "--dpi", "100")), ("history", "d.png", ()), ("convergence", "e.png", ())]

@@ -624,6 +624,7 @@ class BadInput(RunTestCase):
         cases = [((), ("no input file", "--help")),
                  (("--check",), ("no input file",)),
                  (("case.nml", "other.nml"), ("more than one input file", "case.nml and other.nml", "expected one")),
+                 (("--keys", "case.nml"), ("an input file, case.nml, beside --keys",)),
                  (("--frobnicate", "case.nml"), ("unknown option --frobnicate", "--help")),
                  (("case.nml", "-n", "2"), ("unknown option -n",)),
                  (("--check", "absent.nml"), ("absent.nml", "No such file"))]

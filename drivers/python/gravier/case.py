@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-from whole_file import Misplaced, check_place, whole_file
+from whole_file import Locked, Misplaced, check_place, output_lock, whole_file
 
 
 class CaseError(Exception):
@@ -180,10 +180,24 @@ def write_case(groups, directory):
 
 def run(groups, directory, ranks=1, program=None):
     """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
-    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance."""
+    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance. A directory where another `run` is under way is refused,
+    and nothing in it changes."""
     if ranks != int(ranks) or ranks < 1:
         raise CaseError(f"ranks = {ranks}: expected a whole number above 0")
     directory = Path(directory)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as what:
+        raise CaseError(f"{directory}: {what.strerror}; expected a place for a directory") from None
+    try:
+        with output_lock(directory / "terminal.log", "gravier.run"):
+            return run_alone(groups, directory, ranks, program)
+    except Locked as refused:
+        raise CaseError(str(refused)) from None
+
+
+def run_alone(groups, directory, ranks, program):
+    """What `run` does where no other one is under way."""
     write_case(groups, directory)
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:

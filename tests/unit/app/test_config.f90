@@ -5,6 +5,7 @@ program test_config
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, status_input
   use gravier_config_surfaces, only: surface_value
+  use gravier_diagnostic_registry, only: diagnostic_place
   use gravier_config, only: config_t, scene_config_t, boundary_config_t, parse_config, write_active, write_key_reference
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -236,12 +237,20 @@ contains
     call check_equal(config%output%fclib_step, 3, "fclib_step")
     call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
     call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
-    call check(config%output%asks("energy"), "energy")
-    call check(config%output%asks("stress"), "stress")
-    call check(config%output%asks("structure"), "structure")
+    call check(asks(config, "energy"), "energy")
+    call check(asks(config, "stress"), "stress")
+    call check(asks(config, "structure"), "structure")
     call check(config%output%vtk, "vtk")
-    call check(config%output%asks("boundary_forces"), "boundary_forces")
+    call check(asks(config, "boundary_forces"), "boundary_forces")
   end subroutine check_whole_methods
+
+  !> Whether the diagnostic with that key is asked for.
+  logical function asks(config, key)
+    type(config_t), intent(in) :: config
+    character(len=*), intent(in) :: key
+
+    asks = config%output%diagnostics(diagnostic_place(key))
+  end function asks
 
   subroutine test_defaults()
     type(config_t) :: config
@@ -330,11 +339,11 @@ contains
     call check_equal(config%output%fclib_step, 0, "default fclib_step")
     call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
     call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
-    call check(.not. config%output%asks("energy"), "default energy")
-    call check(.not. config%output%asks("stress"), "default stress")
-    call check(.not. config%output%asks("structure"), "default structure")
+    call check(.not. asks(config, "energy"), "default energy")
+    call check(.not. asks(config, "stress"), "default stress")
+    call check(.not. asks(config, "structure"), "default structure")
     call check(.not. config%output%vtk, "default vtk")
-    call check(.not. config%output%asks("boundary_forces"), "default boundary_forces")
+    call check(.not. asks(config, "boundary_forces"), "default boundary_forces")
   end subroutine check_default_methods
 
   subroutine test_defaults_in_space()
