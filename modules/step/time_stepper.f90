@@ -185,8 +185,8 @@ contains
     if (allocated(whole%sub)) call take_whole(whole, self%problem, self%is_whole)
   end subroutine time_stepper_advance
 
-  !> Solve the contact problem, anew as long as it wakes bodies. Beside bodies that cannot move a problem may have no solution: all
-  !> wake where it is not found. Collective.
+  !> Solve the contact problem, anew as long as it wakes bodies. A problem beside sleepers may have no solution, as where three of
+  !> them hold a body that rebounds from one: all wake where none is found, without a try of the second method. Collective.
   subroutine solve(self, figures, error, watch)
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(inout) :: figures
@@ -205,7 +205,7 @@ contains
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
     do tries = 1, most_tries + 1
       call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
-      call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
+      if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
       self%messages = self%messages + self%problem%shared%messages
       self%values = self%values + self%problem%shared%values
       if (allocated(error) .or. figures%solve%status == solve_diverged) return

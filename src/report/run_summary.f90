@@ -279,6 +279,9 @@ contains
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
         text = "solves that do not converge take most of the iterations: see `to mend it`"
+        ! beside sleepers they were solved anew
+        if (simulation%failed == 0) text = "solves beside bodies that sleep, which fail and are solved anew with all awake, "// &
+          & "take most of the iterations: a larger &solver sleep_after, now "//to_text(config%solver%sleep_after)
       else if (overlaps_grew(simulation)) then
         text = "nothing yet: overlaps grow; first choose a smaller &time step or &solver "//goal_name(simulation)
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then

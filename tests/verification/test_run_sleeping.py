@@ -232,6 +232,36 @@ class Sleeping(RunTestCase):
             self.assertEqual(results[final + name].tolist(), runs[1].results()[final + name].tolist(), name)
         self.assertEqual(history["iterations"].tolist(), runs[1].history()["iterations"].tolist())
 
+    def test_held_by_sleepers(self):
+        """A sphere that sleepers hold and that rebounds from one of them has no velocity that their contacts allow. All wake then; the second
+        method does not look for it in vain, and the log names the key that leads there."""
+        edge = 4 * 0.021
+        sides = [plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0])]
+        for axis in range(2):
+            normal = [float(axis == 0), float(axis == 1), 0.0]
+            sides += [plane([0.0, 0.0, 0.0], normal), plane([edge * x for x in normal], [-x for x in normal])]
+        cases = [{"scene": {"dimension": 3, "bodies": "lattice", "lattice_count": [4, 4, 5], "radius_min": 0.007, "radius_max": 0.0104,
+                            "seed": seed, "friction": 0.3, "restitution": 0.9, "wall_restitution": 0.2},
+                  "boundary": sides, "time": {"step": 1e-3, "steps": 1000}, "solver": {"sleeping": True, "sleep_after": 1},
+                  "output": {"directory": "results", "every": 0}} for seed in range(3)]
+        runs = each(lambda seed, case: run_case(case, 1, f"{self.scratch}/held {seed}"), list(enumerate(cases)))
+        shares = []
+        for run in runs:
+            self.assert_status(run, 0)
+            self.assertEqual(run.history()["converged"].min(), 1)
+            # where nothing sleeps the second method is tried as ever
+            taken = re.search(r"took over (\d+) solve", run.stdout)
+            held = run.history()["iterations"] * ((run.history()["woken"] > 0) & (run.history()["iterations"] > 900))
+            self.assertLess(int(taken[1]) if taken else 0, 0.2 * np.count_nonzero(held))
+            shares.append([held[k:k + 50].sum() / (1 + run.history()["iterations"][k:k + 50].sum()) for k in range(0, 950, 10)])
+        seed, begin = np.unravel_index(np.argmax(shares), np.shape(shares))
+        part = [merged(cases[seed], {"time": {"steps": 10 * int(begin) + more}, "output": {"checkpoint_every": 10}}) for more in (0, 50)]
+        self.assert_status(run_case(part[0], 1, self.here("part")), 0)
+        run = run_case(part[1], 1, self.here("part"), options=["--restart"])
+        self.assert_status(run, 0)
+        self.assertIn("\nto halve it solves beside bodies that sleep, which fail and are solved anew with all awake, take most of the iterations: "
+                      "a larger &solver sleep_after, now 1\n", run.stdout)
+
     def test_refusals(self):
         """One line, status 2."""
         for more, expected in [({"warm_start": False}, "bodies that sleep keep their impulses"),
