@@ -99,6 +99,7 @@ contains
         & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
         & least//" in it", most_by_boundary*scales%smallest/scales%speed)
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
+      if (cell_warning(simulation, d) /= "") call warn(cell_warning(simulation, d))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -136,6 +137,28 @@ contains
     end subroutine warn
 
   end subroutine scale_warnings
+
+  !> That a cell is so light that it answers to a change of impulses by more than the contacts themselves; else empty.
+  function cell_warning(simulation, diameter) result(text)
+    type(simulation_t), intent(in) :: simulation
+    !> of the mean grain [m]
+    real(dp), intent(in) :: diameter
+    character(len=:), allocatable :: text
+    real(dp) :: shortest, least
+    integer :: k
+
+    text = ""
+    associate (drive => simulation%cell_drive, length => simulation%decomposition%period%length)
+      if (.not. any(drive%driven)) return
+      shortest = huge(shortest)
+      do k = 1, simulation%decomposition%nd
+        if (any(drive%driven(:, k))) shortest = min(shortest, length(k))
+      end do
+      least = (diameter/shortest)**2
+      if (drive%inertia < least) text = "&scene cell_inertia = "//figure(drive%inertia)//": so light a cell moves too far in "// &
+        & "an iteration for solves to end; at least (d/L)^2 = "//figure(least)//" would do"
+    end associate
+  end function cell_warning
 
   !> That the way of grains in a step is too long.
   function fast_warning(simulation, fast, step) result(text)

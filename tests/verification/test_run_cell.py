@@ -1,11 +1,12 @@
 """Periodic cells that deform: grains that cross them, contacts across them, balances, symmetries, stresses that are held, and one result in any
 number of subdomains, on any number of ranks and after a restart."""
 import os
+import re
 import shutil
 
 import numpy as np
 
-from gravier_runs import SOME_RANKS, RunTestCase, gravier, merged, run_case, write
+from gravier_runs import SOME_RANKS, RunTestCase, each, gravier, merged, run_case, write
 from small_scenes import Grain, bodies_csv
 
 import unittest
@@ -255,6 +256,31 @@ class Cell(RunTestCase):
         self.assertLess(np.mean(history["iterations"]), 20)
         for component in ("xx", "yy"):
             np.testing.assert_allclose(history[f"stress_{component}"], 100.0, rtol=0, atol=5.0)
+
+    def test_newton_takes_over(self):
+        """Rough disks in a cell that pressures drive, at an accuracy that sweeps do not reach in all steps: Newton's method does in most of the
+        others. What it compares with is measured anew after each answer of the cell."""
+        case = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [12, 12], "radius_min": 0.3, "radius_max": 0.6, "friction": 1.5,
+                          "density": 1.0, "gravity": [0.0, 0.0], "period": [15.3, 15.3], "cell_shear_rate": [0.2], "cell_pressure": [1.0, 1.0]},
+                "time": {"step": 0.1, "steps": 100},
+                "solver": {"acceleration": "none", "accuracy": 1e-5, "tolerance": 1e-10, "max_iterations": 2000, "fallback": "newton"},
+                "output": {"directory": "results", "every": 0}}
+        runs = each(lambda seed: run_case(merged(case, {"scene": {"seed": seed}}), directory=self.here(f"taken over {seed}")), [(3,), (4,)])
+        found = [re.search(r"took over (\d+) solves? .*, (\d+) of which then reached it", run.stdout) for run in runs]
+        taken, solved = (sum(int(counts[k]) for counts in found) for k in (1, 2))
+        self.assertGreater(taken, 3)
+        self.assertGreater(solved, 0.6 * taken)
+
+    def test_light_cell(self):
+        """A cell that stresses drive is warned of if it is lighter than (d/L)^2, with the length that they drive; one with given rates has no
+        inertia."""
+        for scene, expected in (({}, 1), ({"cell_inertia": 0.02}, 0), ({"cell_pressure": [0.0, 0.0]}, 0),
+                                ({"period": [7.6, 12.0]}, 0), ({"period": [7.6, 12.0], "cell_pressure": [1.0, 1.0]}, 1)):
+            scene = {"cell_inertia": 0.01, **scene}
+            run = run_case(merged(LATTICE, {"scene": scene}), directory=self.here("light"), options=["--check"])
+            self.assert_status(run, 0)
+            self.assertEqual(len(re.findall(r"^warning     &scene cell_inertia = 1\.00E-02: so light a cell .* at least \(d/L\)\^2 = 1\.7\dE-02 "
+                                            "would do$", run.stdout, re.M)), expected, run.stdout)
 
     def test_refused(self):
         """What does not go with a cell that moves is refused by one line."""

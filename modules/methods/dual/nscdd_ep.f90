@@ -13,7 +13,7 @@ module gravier_nscdd_ep
   use gravier_body_mass, only: subtract_inverse_mass
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: work_t, start_sweeps
-  use gravier_method_options, only: method_features_t, method_options_t, default_on_active
+  use gravier_method_options, only: method_features_t, method_options_t, held_list_t, default_on_active
   use gravier_nscdd, only: nscdd_t, average_copies
   use gravier_search_direction, only: chosen_direction
   use gravier_interface_cg, only: interface_cg_t
@@ -42,6 +42,7 @@ module gravier_nscdd_ep
   contains
     procedure, nopass :: features => nscdd_ep_features
     procedure :: set => nscdd_ep_set
+    procedure :: held => nscdd_ep_held
     procedure :: start => nscdd_ep_start
     procedure :: iterate => nscdd_ep_iterate
     procedure :: free => nscdd_ep_free
@@ -73,6 +74,19 @@ contains
       allocate (interface_direct_t :: self%interface_solver)
     end if
   end subroutine nscdd_ep_set
+
+  pure subroutine nscdd_ep_held(self, nc, nv, held)
+    class(nscdd_ep_t), intent(in) :: self
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    call self%nscdd_t%held(nc, nv, held)
+    call self%matrix%held(nc, nv, held)
+    call held%add("impulses of the safeguard of l", .true., 8, nc)
+    if (.not. self%matrix%direction%active_only) return
+    call held%add("impulses fed back", .true., 8, nc)
+    call held%add("velocities fed back", .false., 8, nv)
+  end subroutine nscdd_ep_held
 
   subroutine nscdd_ep_start(self, problem, error)
     class(nscdd_ep_t), intent(inout) :: self
@@ -220,6 +234,9 @@ contains
     class(nscdd_ep_t), intent(inout) :: self
     call self%matrix%free()
     if (allocated(self%interface_solver)) call self%interface_solver%free()
+    if (allocated(self%change)) deallocate (self%change, self%b)
+    self%feedback = impulse_feedback_t()
+    self%guard = direction_guard_t()
     self%work = work_t()
   end subroutine nscdd_ep_free
 

@@ -10,6 +10,7 @@ module gravier_direction_guard
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   implicit none
   private
   public :: direction_guard_t
@@ -27,11 +28,6 @@ module gravier_direction_guard
   integer, parameter :: most_lowerings = 12
   !> no window yet
   real(dp), parameter :: unknown = huge(1.0_dp)
-
-  type :: kept_impulses_t
-    !> (lanes, nc, blocks) [N s]
-    real(dp), allocatable :: value(:, :, :)
-  end type kept_impulses_t
 
   type :: direction_guard_t
     !> what is left of l in this solve, and times that l was lowered in it
@@ -58,7 +54,7 @@ contains
 
     if (allocated(self%kept)) deallocate (self%kept)
     allocate (self%kept(size(problem%sub)))
-    call keep(self, problem)
+    call copy_impulses(problem, self%kept)
     self%factor = 1.0_dp
     self%lowered = 0
     self%reference = problem%force_scale**2*real(problem%n_contacts, dp)
@@ -76,16 +72,6 @@ contains
     guard%grown = 0
     guard%idle = 0
   end subroutine open_windows
-
-  subroutine keep(guard, problem)
-    type(direction_guard_t), intent(inout) :: guard
-    type(contact_problem_t), intent(in) :: problem
-    integer :: s
-
-    do s = 1, size(problem%sub)
-      guard%kept(s)%value = problem%sub(s)%impulse
-    end do
-  end subroutine keep
 
   !> Judge an iteration. If l is lowered, the impulses of the problem are those kept, and the caller must start its velocities
   !> and matrices anew. Collective.
@@ -130,7 +116,7 @@ contains
       guard%grown = 0
       guard%before = guard%now
       guard%reference = max(guard%reference, guard%largest)
-      call keep(guard, problem)
+      call copy_impulses(problem, guard%kept)
     end if
     guard%idle = guard%idle + 1
     if (guard%now < progress*guard%lowest) then
@@ -155,11 +141,8 @@ contains
     type(contact_problem_t), intent(inout) :: problem
     real(dp), intent(in) :: factor
     logical, intent(out) :: lowered
-    integer :: s
 
-    do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :, :) = guard%kept(s)%value
-    end do
+    call restore_impulses(problem, guard%kept)
     guard%lowered = guard%lowered + 1
     guard%factor = factor*guard%factor
     if (guard%lowered >= most_lowerings) guard%factor = 0.0_dp

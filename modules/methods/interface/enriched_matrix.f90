@@ -11,12 +11,13 @@ module gravier_enriched_matrix
   use gravier_body_mass, only: mass_column
   use gravier_contact_operator, only: find_local_operator
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_method_options, only: held_list_t
   use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
   use gravier_search_direction, only: search_direction_t
   implicit none
   private
-  public :: enriched_matrix_t, enriched_part_t, sweep_all_recording, drop_inactive
+  public :: enriched_matrix_t, sweep_all_recording, drop_inactive
 
   !> What one subdomain adds to its contact problem.
   type :: enriched_part_t
@@ -41,6 +42,7 @@ module gravier_enriched_matrix
   contains
     procedure :: set_factor => enriched_matrix_set_factor
     procedure :: count_use => enriched_matrix_count_use
+    procedure, nopass :: held => enriched_matrix_held
     procedure :: start => enriched_matrix_start
     procedure :: update => enriched_matrix_update
     procedure :: factorise_blocks => enriched_matrix_factorise_blocks
@@ -51,6 +53,16 @@ module gravier_enriched_matrix
   end type enriched_matrix_t
 
 contains
+
+  !> What `start` allocates where l has no blocks of the caller; not the factors, whose size the matrices decide.
+  pure subroutine enriched_matrix_held(nc, nv, held)
+    !> components of a contact, of a body
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    call held%add("enriched matrix, without factors", .true., 8, 3*nc)
+    call held%add("right-hand side of the enriched matrix", .false., 8, nv)
+  end subroutine enriched_matrix_held
 
   !> Make ready for a new problem. Factors of the last problem are kept, in case the matrices are the same.
   subroutine enriched_matrix_start(self, problem, error)

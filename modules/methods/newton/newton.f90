@@ -17,6 +17,7 @@ module gravier_newton
   use gravier_nscdd, only: nscdd_t
   use gravier_proximal_law, only: proximal_law_t
   use gravier_proximal_weight, only: proximal_weight_t
+  use gravier_sweep_turns, only: sweep_turns_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_interface_problem, only: interface_field_t, make_field, chain_differences, load_transpose
   use gravier_interface_direct, only: interface_direct_t
@@ -24,16 +25,7 @@ module gravier_newton
   private
   public :: newton_t
 
-  !> turns of accelerated sweeps; in later ones they are plain
-  integer, parameter :: accelerated_turns = 3
-  !> iterations of a window of sweeps in the first turn, doubled in the next ones; what is left of its least change if they do well
-  integer, parameter :: first_window = 100
-  real(dp), parameter :: little_gain = 0.5_dp
-  !> plain sweeps of the first turn that has them, doubled from turn to turn, so often at most
-  integer, parameter :: plain_sweeps = 4000, most_doublings = 6
-  !> Newton's steps without progress that end the first turn, doubled in the next ones, and those that end a turn of plain sweeps;
-  !> times which a residual must fall to be progress
-  integer, parameter :: first_patience = 100, late_patience = 40
+  !> what is left of a defect that has fallen far enough to be progress
   real(dp), parameter :: progress_made = 0.8_dp
   !> most steps to a proximal point
   integer, parameter :: most_inner_steps = 25
@@ -60,16 +52,15 @@ module gravier_newton
     type(newton_part_t), allocatable, private :: part(:)
     type(interface_field_t), allocatable, private :: b(:), f(:)
     logical, private :: sweeping = .true.
-    !> turns of sweeps and Newton's steps; iterations of this part of a turn; steps of this proximal point
-    integer, private :: turn = 0, taken = 0, inner = 0
-    !> lowest |r - y|^2 of this window of sweeps and of the last [N^2 s^2]
-    real(dp), private :: lowest = 0.0_dp, last_lowest = 0.0_dp
+    type(sweep_turns_t), private :: turns
+    !> Newton's steps since the last progress; those of this proximal point
+    integer, private :: taken = 0, inner = 0
     type(proximal_weight_t), private :: weight
     !> |F| at the iterate and at the last points of the inner loop, and where it counts as solved [N s]
     real(dp), private :: size_of_f = 0.0_dp, past(memory) = 0.0_dp, goal = 0.0_dp
     !> lowest |F| after each step of the inner loop [N s]
     real(dp), private :: reached(0:most_inner_steps) = 0.0_dp
-    !> residuals: of the best impulses, of the last centre, of the last progress; the least when the sweeps were left
+    !> defects: of the best impulses, of the last centre, of the last progress; the least when the sweeps were left [N s]
     real(dp), private :: least = 0.0_dp, before = 0.0_dp, mark = 0.0_dp, least_swept = 0.0_dp
   contains
     procedure, nopass :: features => newton_features
@@ -141,23 +132,19 @@ contains
         part%v(:, :, :) = 0.0_dp
       end associate
     end do
-    self%turn = 0
+    self%turns = sweep_turns_t()
     self%least = huge(1.0_dp)
     call begin_sweeps(self)
   end subroutine newton_start
 
-  !> Sweeps come next: accelerated in the first turns, plain in later ones. Where accelerated sweeps oscillate, plain ones still
-  !> progress slowly.
+  !> Sweeps come next.
   subroutine begin_sweeps(self)
     class(newton_t), intent(inout) :: self
 
     self%sweeping = .true.
-    self%acceleration%on = self%turn < accelerated_turns
+    self%acceleration%on = self%turns%accelerate()
     self%check_next = .false.
     self%keeps_best = .true.
-    self%taken = 0
-    self%lowest = huge(1.0_dp)
-    self%last_lowest = huge(1.0_dp)
   end subroutine begin_sweeps
 
   subroutine newton_iterate(self, problem, measure, jump, error)
@@ -166,49 +153,31 @@ contains
     logical, intent(in) :: measure
     real(dp), intent(out) :: jump
     type(error_t), allocatable, intent(inout) :: error
-    logical :: stagnant
+    logical :: over
 
     jump = 0.0_dp
     if (allocated(error)) return
     if (self%sweeping) then
       call self%nscdd_t%iterate(problem, measure, jump, error)
-      call close_window(self, stagnant)
-      if (stagnant) call begin_steps(self, problem)
+      call self%turns%count_sweep(self%acceleration%change, over)
+      if (over) call begin_steps(self, problem)
     else
       call make_step(self, problem, measure, jump)
     end if
   end subroutine newton_iterate
 
-  !> Whether windows of sweeps have come to bring little, or the plain sweeps of a turn are done.
-  subroutine close_window(self, stagnant)
-    class(newton_t), intent(inout) :: self
-    logical, intent(out) :: stagnant
-
-    stagnant = .false.
-    self%taken = self%taken + 1
-    if (.not. self%acceleration%on) then
-      stagnant = self%taken == plain_sweeps*2**min(self%turn - accelerated_turns, most_doublings)
-      return
-    end if
-    self%lowest = min(self%lowest, self%acceleration%change)
-    if (mod(self%taken, first_window*2**self%turn) /= 0) return
-    stagnant = self%lowest > little_gain**2*self%last_lowest
-    self%last_lowest = self%lowest
-    self%lowest = huge(1.0_dp)
-  end subroutine close_window
-
   !> Newton's steps come next, from where the sweeps have come to. Collective.
   subroutine begin_steps(self, problem)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: residual
+    real(dp) :: defect
     integer :: s
 
     self%sweeping = .false.
     self%check_next = .true.
     self%taken = 0
     self%weight = proximal_weight_t()
-    call keep_best(self, problem, residual)
+    call keep_best(self, problem, defect)
     do s = 1, size(self%part)
       associate (part => self%part(s), sub => problem%sub(s))
         part%r(:, :, :) = sub%impulse
@@ -217,8 +186,8 @@ contains
       end associate
     end do
     self%least_swept = self%least
-    self%mark = residual
-    self%before = residual
+    self%mark = defect
+    self%before = defect
     call restart_point(self, problem, moves=.true.)
     call take_best(self, problem)
   end subroutine begin_steps
@@ -268,8 +237,9 @@ contains
     logical, intent(in) :: measure
     real(dp), intent(inout) :: jump
     type(error_t), allocatable :: singular
-    real(dp) :: residual
+    real(dp) :: defect
 
+    if (problem%cell%is_driven) call follow_cell(self, problem)
     self%past(1 + mod(self%inner, memory)) = self%size_of_f
     call find_step(self, problem, singular)
     self%inner = self%inner + 1
@@ -279,13 +249,28 @@ contains
     if (measure .and. .not. allocated(singular)) jump = problem%jump()
     call start_timer(phase_check)
     if (.not. allocated(singular)) call search_line(self, problem)
-    call keep_best(self, problem, residual)
+    call keep_best(self, problem, defect)
     self%reached(self%inner) = min(self%reached(self%inner - 1), self%size_of_f)
-    if (allocated(singular) .or. self%size_of_f <= self%goal .or. is_stuck(self)) call end_point(self, problem, residual)
+    if (allocated(singular) .or. self%size_of_f <= self%goal .or. is_stuck(self)) call end_point(self, problem, defect)
     call take_best(self, problem)
     if (self%sweeping) call resume_sweeps(self, problem)
     call stop_timer(phase_check)
   end subroutine make_step
+
+  !> The cell has answered to the best impulses: measure them, and F at the iterate, anew under its present motion. Collective.
+  subroutine follow_cell(self, problem)
+    class(newton_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    real(dp) :: ignored
+    integer :: s
+
+    call problem%evaluate()
+    call problem%residual(ignored, self%least)
+    do s = 1, size(self%part)
+      problem%sub(s)%impulse(:, :, :) = self%part(s)%r
+    end do
+    call evaluate(self, problem, self%size_of_f)
+  end subroutine follow_cell
 
   !> Sweeps go on from where they were left, or, plain ones, from the best impulses if Newton's steps have found them. Collective.
   subroutine resume_sweeps(self, problem)
@@ -295,6 +280,8 @@ contains
 
     if (self%acceleration%on .or. .not. self%least < self%least_swept) then
       do s = 1, size(self%part)
+        ! those of accelerated sweeps are relaxed
+        if (.not. self%acceleration%on) call problem%sub(s)%share_masses(problem%kernels, .true.)
         problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
         problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
       end do
@@ -406,11 +393,11 @@ contains
 
   !> Project the impulses of the problem on Coulomb's cones, outside of which iterates may lie, and keep them if they are the
   !> best so far. Collective.
-  subroutine keep_best(self, problem, residual)
+  subroutine keep_best(self, problem, defect)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    !> of these impulses
-    real(dp), intent(out) :: residual
+    !> of these impulses [N s]
+    real(dp), intent(out) :: defect
     real(dp) :: ignored
     integer :: s
 
@@ -418,19 +405,19 @@ contains
       call project_on_cones(problem%kernels, problem%sub(s)%n_contacts, problem%sub(s)%hot, problem%sub(s)%impulse)
     end do
     call problem%evaluate()
-    call problem%residual(residual, ignored)
-    call self%see(problem, residual)
+    call problem%residual(ignored, defect)
+    call self%see(problem, defect)
   end subroutine keep_best
 
   !> Keep the impulses of the problem if they are the best so far.
-  subroutine newton_see(self, problem, residual)
+  subroutine newton_see(self, problem, defect)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp), intent(in) :: residual
+    real(dp), intent(in) :: defect
     integer :: s
 
-    if (.not. residual < self%least) return
-    self%least = residual
+    if (.not. defect < self%least) return
+    self%least = defect
     do s = 1, size(self%part)
       self%part(s)%best(:, :, :) = problem%sub(s)%impulse
     end do
@@ -449,25 +436,25 @@ contains
 
   !> The iterate becomes the next centre if it is worth it, alpha goes with the steps taken; where all that has brought no
   !> progress, sweeps come next. Collective.
-  subroutine end_point(self, problem, residual)
+  subroutine end_point(self, problem, defect)
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    !> of the iterate
-    real(dp), intent(in) :: residual
+    !> of the iterate [N s]
+    real(dp), intent(in) :: defect
     logical :: found, moves
 
     found = self%size_of_f <= self%goal
     call self%weight%adapt(found, self%inner)
-    if (residual <= progress_made*self%mark) then
-      self%mark = residual
+    if (defect < progress_made*self%mark) then
+      self%mark = defect
       self%taken = 0
-    else if (self%taken >= merge(first_patience*2**min(self%turn, accelerated_turns), late_patience, self%acceleration%on)) then
-      self%turn = self%turn + 1
+    else if (self%taken >= self%turns%patience()) then
+      call self%turns%finish()
       call begin_sweeps(self)
       return
     end if
-    moves = found .or. residual < self%before
-    self%before = residual
+    moves = found .or. defect < self%before
+    self%before = defect
     call restart_point(self, problem, moves)
   end subroutine end_point
 
@@ -486,7 +473,7 @@ contains
     class(newton_t), intent(inout) :: self
     call self%matrix%free()
     call self%interface_solver%free()
-    if (allocated(self%part)) deallocate (self%part)
+    if (allocated(self%part)) deallocate (self%part, self%b, self%f)
     self%work = work_t()
   end subroutine newton_free
 

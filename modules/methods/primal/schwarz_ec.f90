@@ -5,7 +5,7 @@ module gravier_schwarz_ec
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t, take_options, work_t, start_sweeps
-  use gravier_method_options, only: method_features_t, method_options_t
+  use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_direction_guard, only: direction_guard_t
   use gravier_search_direction, only: chosen_direction
   use gravier_enriched_matrix, only: enriched_matrix_t, sweep_all_recording
@@ -26,6 +26,7 @@ module gravier_schwarz_ec
   contains
     procedure, nopass :: features => schwarz_ec_features
     procedure :: set => schwarz_ec_set
+    procedure :: held => schwarz_ec_held
     procedure :: start => schwarz_ec_start
     procedure :: iterate => schwarz_ec_iterate
     procedure :: free => schwarz_ec_free
@@ -48,6 +49,16 @@ contains
     self%matrix%direction = chosen_direction(options, usual_direction, usual_direction)
     self%direction_text = self%matrix%direction%text()
   end subroutine schwarz_ec_set
+
+  pure subroutine schwarz_ec_held(self, nc, nv, held)
+    class(schwarz_ec_t), intent(in) :: self
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    call self%acceleration%held(nc, nv, held)
+    call self%matrix%held(nc, nv, held)
+    call held%add("impulses of the safeguard of l", .true., 8, nc)
+  end subroutine schwarz_ec_held
 
   subroutine schwarz_ec_start(self, problem, error)
     class(schwarz_ec_t), intent(inout) :: self

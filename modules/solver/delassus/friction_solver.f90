@@ -32,8 +32,8 @@ module gravier_friction_solver
     integer :: sweeps = 0, newton_steps = 0
     !> of the impulses found: the two measures of gravier_delassus
     real(dp) :: literature = 0.0_dp, consistent = 0.0_dp
-    !> largest velocity of approach, and largest impulse as a velocity s |r|, relative to max|q|, with their contacts
-    real(dp) :: approach = 0.0_dp, impulse = 0.0_dp
+    !> largest impulse as a velocity s |r|, relative to max|q|; contacts of the largest velocity of approach and of that impulse
+    real(dp) :: impulse = 0.0_dp
     integer :: worst(2) = 0
     !> how impulses grew
     type(growth_t) :: growth
@@ -62,7 +62,7 @@ contains
     real(dp), allocatable :: v(:, :)
     type(sweep_control_t) :: sweeping
     type(contact_newton_t) :: newton
-    real(dp) :: figure
+    real(dp) :: figure, approach
 
     if (allocated(error)) return
     select case (control%method)
@@ -83,7 +83,7 @@ contains
     allocate (v(size(r, 1), size(r, 2)))
     call problem%velocity(r, v)
     call problem%measure(r, v, report%literature, report%consistent)
-    call problem%find_extremes(r, v, report%approach, report%impulse, report%worst)
+    call problem%find_extremes(r, v, approach, report%impulse, report%worst)
     report%converged = problem%figure(r, v) <= control%tolerance
     if (report%converged) then
       report%verdict = verdict_solved
@@ -130,6 +130,7 @@ contains
     call newton%free()
     if (report%growth%ends() .and. report%growth%kind /= growth_proven) then
       call start_afresh(problem)
+      if (growth%kind == growth_proven) report%growth = growth
       call keep_best()
     end if
 

@@ -17,7 +17,7 @@ module gravier_unbounded
   use gravier_friction_cone, only: project_on_cone
   implicit none
   private
-  public :: growth_none, growth_marked, growth_proven, growth_t, ray_sums_t, find_growth, note_growth
+  public :: growth_none, growth_marked, growth_proven, growth_t, find_growth, note_growth
 
   !> no sign of growth without bound; W z = 0 and z.q < 0 with friction in z; a proof
   integer, parameter :: growth_none = 0, growth_marked = 1, growth_proven = 2

@@ -3,6 +3,7 @@ module gravier_acceleration
   use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_method_options, only: held_list_t
   implicit none
   private
   public :: acceleration_t, start_acceleration, change_relaxation_factors, extrapolate
@@ -70,9 +71,22 @@ module gravier_acceleration
     procedure :: choose_steering => acceleration_choose_steering
     procedure :: steer => acceleration_steer
     procedure :: whole => acceleration_whole
+    procedure :: held => acceleration_held
   end type acceleration_t
 
 contains
+
+  !> The arrays that acceleration holds.
+  pure subroutine acceleration_held(self, nc, nv, held)
+    class(acceleration_t), intent(in) :: self
+    !> components of a contact, of a body
+    integer, intent(in) :: nc, nv
+    type(held_list_t), intent(inout) :: held
+
+    if (.not. self%on) return
+    call held%add("impulse before (acceleration)", .true., 8, nc)
+    call held%add("velocity before (acceleration)", .false., 8, nv)
+  end subroutine acceleration_held
 
   !> Begin a solve from the impulses and velocities that a problem holds. Collective.
   subroutine start_acceleration(acceleration, problem)

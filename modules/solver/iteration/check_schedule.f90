@@ -139,7 +139,8 @@ contains
       self%skips = 0
     else
       if (regular) self%skips = self%skips + 1
-      if (regular .or. self%ratio > 0.0_dp) call history%note(iteration, expected, goal)
+      ! without a figure that is expected, the goal is not known to be reached
+      if (expected > 0.0_dp .and. (regular .or. self%ratio > 0.0_dp)) call history%note(iteration, expected, goal)
     end if
   end function is_worth_a_check
 

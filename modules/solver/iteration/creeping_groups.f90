@@ -9,7 +9,7 @@ module gravier_creeping_groups
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: apply_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_disjoint_sets, only: first_of
   implicit none
   private
@@ -44,14 +44,12 @@ contains
     integer :: s
 
     if (problem%kernels%friction_row == 0) return
+    call copy_impulses(problem, now)
     do s = 1, size(problem%sub)
-      now(s)%value = problem%sub(s)%impulse
       problem%sub(s)%impulse(:, :, :) = problem%sub(s)%impulse - earlier(s)%value
     end do
     call describe_changes(problem, now, creep)
-    do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :, :) = now(s)%value
-    end do
+    call restore_impulses(problem, now)
     call problem%evaluate()
   end subroutine find_creep
 

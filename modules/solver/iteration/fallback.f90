@@ -5,9 +5,10 @@ module gravier_fallback
   use gravier_errors, only: error_t
   use gravier_cell_response, only: respond
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_method, only: method_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, &
-    & solve_converged, solve_exhausted, solve_diverged, solve_stagnated
+    & solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
   public :: fallback_t
@@ -30,11 +31,6 @@ module gravier_fallback
     procedure :: free => fallback_free
   end type fallback_t
 
-  !> Impulses of a subdomain.
-  type :: impulses_t
-    real(dp), allocatable :: r(:, :, :)
-  end type impulses_t
-
 contains
 
   !> Go on with a solve that has stagnated, or that made many iterations in vain. The impulses and the report are those of the
@@ -49,10 +45,9 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     class(exact_solution_t), intent(in), optional :: exact
     class(solve_watch_t), intent(inout), optional :: watch
-    type(impulses_t) :: kept(size(problem%sub))
+    type(kept_impulses_t) :: kept(size(problem%sub))
     type(solve_control_t) :: again
     type(solve_report_t) :: second
-    integer :: s
 
     if (allocated(error) .or. .not. allocated(self%method)) return
     if (.not. has_failed(report) .or. problem%n_contacts > self%most_contacts) return
@@ -60,9 +55,7 @@ contains
     again%layered = .false.
     again%figure_ratio = 0.0_dp
     again%max_iterations = min(most_iterations, control%max_iterations)
-    do s = 1, size(kept)
-      kept(s)%r = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, kept)
     call solve_contacts(problem, self%method, again, second, error, exact, watch)
     if (allocated(error)) return
     self%taken = self%taken + 1
@@ -72,9 +65,7 @@ contains
       call join(report, second)
       return
     end if
-    do s = 1, size(kept)
-      call move_alloc(kept(s)%r, problem%sub(s)%impulse)
-    end do
+    call restore_impulses(problem, kept)
     if (problem%cell%is_driven) call respond(problem)
     call problem%evaluate()
     report%iterations = report%iterations + second%iterations
@@ -97,7 +88,7 @@ contains
     is_better = second%figure < first%figure
   end function is_better
 
-  !> The report of both solves as of one, which ends as the second has ended.
+  !> The report of both solves as of one. It ends as the second has ended where that has found the solution or that there is none.
   pure subroutine join(report, second)
     !> of the first; then of both
     type(solve_report_t), intent(inout) :: report
@@ -115,7 +106,7 @@ contains
     call report%history%follow(first%history, first%iterations)
     ! it tells nothing about the first method
     report%figure_ratio = 0.0_dp
-    if (report%status /= solve_converged) then
+    if (report%status /= solve_converged .and. report%status /= solve_unbounded) then
       report%status = first%status
       report%creep = first%creep
     end if

@@ -8,7 +8,7 @@ module gravier_layer_trial
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_layered_start, only: carry_loads
   use gravier_fresh_start, only: begin_anew
-  use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   implicit none
   private
   public :: layer_trial_t
@@ -109,7 +109,6 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: sweeps
     logical :: carried
-    integer :: s
 
     if (velocity%levels%most_depth < 0) call velocity%levels%find_depth(problem)
     if (velocity%levels%most_depth < nearly*above%way) then
@@ -120,9 +119,7 @@ contains
     if (velocity%criterion() <= above%error*problem%error_scale) return
     self%may_try = .false.
     if (.not. allocated(self%before)) allocate (self%before(size(problem%sub)))
-    do s = 1, size(problem%sub)
-      self%before(s)%value = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, self%before)
     self%error_before = velocity%measure_of_start()
     call carry_loads(problem, above%way, method%work, sweeps, carried)
     if (.not. sweeps > 0.0_dp) return
@@ -163,12 +160,9 @@ contains
     type(velocity_error_t), intent(inout) :: velocity
     integer, intent(in) :: iteration
     type(error_t), allocatable, intent(inout) :: error
-    integer :: s
 
     self%layered = .false.
-    do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :, :) = self%before(s)%value
-    end do
+    call restore_impulses(problem, self%before)
     call begin_anew(problem, method, velocity, iteration, error)
     self%anew = .true.
   end subroutine go_back

@@ -225,7 +225,9 @@ contains
     associate (sub => problem%sub(s))
       call start_layer(this, l)
       call find_contacts(sub, this, found)
-      call list_movable(sub, this, found)
+      associate (part => problem%shared%part(s))
+        call list_movable(sub, part%body(1:part%n_shared), this, found)
+      end associate
       allocate (pair(2, size(found)), order(size(found)))
       do k = 1, size(found)
         pair(:, k) = sub%pair(:, found(k))
@@ -291,25 +293,25 @@ contains
     found = list(1:n)
   end subroutine find_contacts
 
-  !> The bodies of these contacts that move, with their weights and velocities.
-  subroutine list_movable(sub, this, found)
+  !> The bodies of these contacts that move, with their weights and velocities. A body that subdomains share moves in all of them,
+  !> also where none of its contacts is taken: its copies are averaged.
+  subroutine list_movable(sub, shared, this, found)
     type(subproblem_t), intent(in) :: sub
+    !> bodies of this subdomain that others have, too
+    integer, intent(in), contiguous :: shared(:)
     type(layers_t), intent(inout) :: this
     integer, intent(in), contiguous :: found(:)
     integer, allocatable :: list(:)
-    integer :: b, i, k, m
+    integer :: i, k, m
 
-    allocate (list(2*size(found)))
+    allocate (list(size(shared) + 2*size(found)))
     m = 0
+    do i = 1, size(shared)
+      call take(shared(i))
+    end do
     do i = 1, size(found)
       do k = 1, 2
-        b = sub%pair(k, found(i))
-        if (b > sub%n_bodies) cycle
-        if (.not. this%moves(b) .or. any(this%weight(:, b) > 0.0_dp)) cycle
-        m = m + 1
-        list(m) = b
-        this%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
-        this%velocity(:, b) = this%loaded(:, b)
+        if (sub%pair(k, found(i)) <= sub%n_bodies) call take(sub%pair(k, found(i)))
       end do
     end do
     this%movable = list(1:m)
@@ -318,6 +320,20 @@ contains
     do k = 1, m
       this%previous(:, k) = this%velocity(:, this%movable(k))
     end do
+
+  contains
+
+    !> Let body `b` move, if it does in this layer and is not listed.
+    subroutine take(b)
+      integer, intent(in) :: b
+
+      if (.not. this%moves(b) .or. any(this%weight(:, b) > 0.0_dp)) return
+      m = m + 1
+      list(m) = b
+      this%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
+      this%velocity(:, b) = this%loaded(:, b)
+    end subroutine take
+
   end subroutine list_movable
 
   !> The contacts taken, in sweep order and in blocks; the rest of the last block has no effect.

@@ -4,7 +4,6 @@ module gravier_method
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_sweep, phase_exchange, clock
   use gravier_communicator, only: communicator_t
-  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_acceleration, only: acceleration_t, start_acceleration, change_relaxation_factors, extrapolate
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
@@ -113,18 +112,17 @@ contains
     integer, intent(in) :: nc, nv
     type(held_list_t), intent(inout) :: held
 
-    if (.not. self%acceleration%on) return
-    call held%add("impulse before (acceleration)", .true., 8, nc)
-    call held%add("velocity before (acceleration)", .false., 8, nv)
+    call self%acceleration%held(nc, nv, held)
   end subroutine method_held
 
-  !> A check has found this residual of the impulses of the problem; methods that keep the best ones override it.
-  subroutine method_see(self, problem, residual)
+  !> A check has found this defect of the impulses of the problem; methods that keep the best ones override it.
+  subroutine method_see(self, problem, defect)
     class(method_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
-    real(dp), intent(in) :: residual
+    !> as the residual has it, not cut to 0 where it is rounding [N s]
+    real(dp), intent(in) :: defect
 
-    associate (unused_self => self, unused_problem => problem, unused => residual)
+    associate (unused_self => self, unused_problem => problem, unused => defect)
     end associate
   end subroutine method_see
 

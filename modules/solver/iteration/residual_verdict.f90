@@ -11,7 +11,8 @@ module gravier_residual_verdict
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
-  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, speed_against
+  use gravier_kept_impulses, only: kept_impulses_t
+  use gravier_vain_impulses, only: are_in_vain, speed_against
   use gravier_velocity_error, only: velocity_error_t, violations_allowed
   implicit none
   private

@@ -174,7 +174,7 @@ contains
         if (done) exit
         call state%trial%advance(problem, method, state%velocity, report%iterations, anew, error)
         if (allocated(error)) return
-        call state%fresh%renew(problem, method, state%velocity, report%iterations, anew, error)
+        if (.not. anew) call state%fresh%renew(problem, method, state%velocity, report%iterations, anew, error)
         if (allocated(error)) return
         if (anew) call state%schedule%forget_ratio()
       end if
@@ -230,6 +230,7 @@ contains
     real(dp) :: ignored
 
     call method%conclude(problem)
+    if (problem%cell%is_driven) call respond(problem)
     call problem%residual(report%residual, ignored)
     call state%velocity%bound(problem)
     call complete_estimate(state, problem, method, report)
@@ -258,7 +259,7 @@ contains
       call problem%residual(report%residual, defect)
       call state%velocity%bound(problem)
     end if
-    call method%see(problem, report%residual)
+    call method%see(problem, defect)
     if (control%criterion == by_error) report%error = exact%error(problem)
     call judge(state, problem, method, control, report, defect, finished)
     if (control%trace) call keep_trace(report, start - state%began - state%checking)
@@ -351,8 +352,7 @@ contains
     type(solve_report_t), intent(inout) :: report
 
     report%accurate = state%velocity%is_exact
-    if (report%accurate) return
-    if (state%velocity%rests()) report%accurate = state%velocity%all_are_slow(problem)
+    if (state%velocity%rests() .and. .not. report%accurate) report%accurate = state%velocity%all_are_slow(problem)
     if (report%accurate) return
     report%accurate = state%velocity%criterion() <= control%accuracy*problem%error_scale
     if (report%iterations >= copies_ready) return

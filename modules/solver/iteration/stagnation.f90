@@ -7,7 +7,8 @@
 module gravier_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses
+  use gravier_vain_impulses, only: are_in_vain
   use gravier_creeping_groups, only: creep_t, find_creep
   implicit none
   private
@@ -69,12 +70,9 @@ contains
     type(stagnation_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: iteration
-    integer :: s
 
     if (.not. allocated(self%kept)) allocate (self%kept(size(problem%sub)))
-    do s = 1, size(problem%sub)
-      self%kept(s)%value = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, self%kept)
     self%kept_at = iteration
   end subroutine keep_impulses
 

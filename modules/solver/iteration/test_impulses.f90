@@ -21,7 +21,7 @@ module gravier_test_impulses
   use gravier_cell_response, only: virial_of
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
-  use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_kept_impulses, only: kept_impulses_t
   implicit none
   private
   public :: test_impulses_t, projection_t

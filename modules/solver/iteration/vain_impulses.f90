@@ -16,14 +16,10 @@ module gravier_vain_impulses
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lane_of, block_of, project_on_cones
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   implicit none
   private
-  public :: kept_impulses_t, are_in_vain, speed_against
-
-  !> Impulses of a subdomain (lanes, nc, blocks) [N s].
-  type :: kept_impulses_t
-    real(dp), allocatable :: value(:, :, :)
-  end type kept_impulses_t
+  public :: are_in_vain, speed_against
 
   !> speed that a solution would need, over the largest speed of the problem, from which on there is none
   real(dp), parameter :: beyond = 20.0_dp
@@ -39,15 +35,16 @@ contains
     type(kept_impulses_t) :: now(size(problem%sub))
     integer :: s
 
+    call copy_impulses(problem, now)
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
-        now(s)%value = sub%impulse
         sub%impulse(:, :, :) = sub%impulse - earlier(s)%value
         call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, sub%impulse)
       end associate
     end do
     in_vain = exceeds_bound(problem, now)
-    call put_back(problem, now)
+    call restore_impulses(problem, now)
+    call problem%evaluate()
   end function are_in_vain
 
   !> The largest speed at which something prescribed works against the impulse of a contact, along that impulse: a boundary, or the
@@ -75,7 +72,7 @@ contains
           associate (r => sub%impulse(lane_of(c), 1:kernels%nf, block_of(c)))
             impulse = norm2(r)
             if (impulse > 0.0_dp) speed = max(speed, -(dot_product(r, v(lane_of(c), 1:kernels%nf, block_of(c))) &
-              & + r(1)*sub%hot(lane_of(c), kernels%row%shift, block_of(c)))/impulse)
+              & + work_of_shift(problem, sub%hot(lane_of(c), :, block_of(c)), r))/impulse)
           end associate
         end do
         deallocate (prescribed, v)
@@ -110,18 +107,6 @@ contains
     exceeds = sums(1) > 0.0_dp .and. sums(1) > beyond*fastest*sums(2)
   end function exceeds_bound
 
-  !> The impulses as they were, and the velocities under them. Collective.
-  subroutine put_back(problem, now)
-    type(contact_problem_t), intent(inout) :: problem
-    type(kept_impulses_t), intent(in) :: now(:)
-    integer :: s
-
-    do s = 1, size(problem%sub)
-      problem%sub(s)%impulse(:, :, :) = now(s)%value
-    end do
-    call problem%evaluate()
-  end subroutine put_back
-
   !> A of a subdomain, whose `reaction` is H z of its own contacts [J].
   pure subroutine add_work(problem, sub, r, work)
     type(contact_problem_t), intent(in) :: problem
@@ -138,19 +123,34 @@ contains
       end do
     end do
     do c = 1, sub%n_contacts
-      work = work - sub%impulse(lane_of(c), 1, block_of(c))*sub%hot(lane_of(c), problem%kernels%nd + 1, block_of(c))
+      associate (z => sub%impulse(lane_of(c), 1:problem%kernels%nf, block_of(c)))
+        work = work - work_of_shift(problem, sub%hot(lane_of(c), :, block_of(c)), z)
+      end associate
     end do
     if (.not. allocated(sub%spring)) return
     associate (row => problem%kernels%row, nd => problem%kernels%nd)
       do c = 1, sub%n_contacts
         associate (z => sub%impulse(lane_of(c), :, block_of(c)), contact => sub%hot(lane_of(c), :, block_of(c)))
           work = work - z(1)*contact(row%compliance_n)*r(lane_of(c), 1, block_of(c)) &
-            & - sum(z(2:nd)*(contact(row%shift_t:row%shift_t + nd - 2) &
-            &                + contact(row%compliance_t)*r(lane_of(c), 2:nd, block_of(c))))
+            & - sum(z(2:nd)*contact(row%compliance_t)*r(lane_of(c), 2:nd, block_of(c)))
         end associate
       end do
     end associate
   end subroutine add_work
+
+  !> z s of a contact with the shift s of its law, along the normal and, where the scene has such, along the tangents [J].
+  pure real(dp) function work_of_shift(problem, contact, z) result(work)
+    type(contact_problem_t), intent(in) :: problem
+    !> its data
+    real(dp), intent(in) :: contact(:)
+    !> impulse [N s]
+    real(dp), intent(in) :: z(:)
+
+    associate (row => problem%kernels%row)
+      work = z(1)*contact(row%shift)
+      if (row%shift_t > 0) work = work + sum(z(2:)*contact(row%shift_t:row%shift_t + size(z) - 2))
+    end associate
+  end function work_of_shift
 
   !> |P| of a subdomain, whose `reaction` is H z of all contacts, a copy of a shared body counting with its part; the moment of a
   !> grain counts as a force at its rim, and the speed of its rim as one [N s], [m/s].

@@ -1,10 +1,11 @@
-!> The mass matrix of a body and its inverse: the one place that knows how they are stored.
+!> The mass matrix of a body and its inverse: the one place that knows how moments of inertia are stored.
 !>
 !> The inverse mass matrix of a body is a column (nw): 1/m along each axis [1/kg] and, where bodies turn, 1/I [1/(kg m^2)], 0 for
 !> what cannot move. The last row holds for all components of a velocity from there on, so that the matrix of disks and spheres is
 !> diagonal and takes nd + 1 rows. In space, bodies with shapes have a symmetric matrix J^-1 in the place of 1/I: its entries xx,
 !> yy, zz, xy, xz and yz in global axes are rows 4 to 9. Columns of `inverse_mass` are the undivided bodies, columns of `weight` the
-!> masses as a method shares them out. Beside these procedures only the loops over contacts (gravier_kernel_table) read columns.
+!> masses as a method shares them out. Beside these procedures the loops over contacts (gravier_kernel_table) and
+!> gravier_contact_operator read columns; others read their first rows alone, 1/m.
 module gravier_body_mass
   use gravier_kinds, only: dp
   implicit none

@@ -22,7 +22,8 @@ program test_solver_parts
   use gravier_check_schedule, only: check_schedule_t
   use gravier_fresh_start, only: fresh_start_t
   use gravier_stagnation, only: stagnation_t
-  use gravier_vain_impulses, only: kept_impulses_t, are_in_vain, speed_against
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
+  use gravier_vain_impulses, only: are_in_vain, speed_against
   use gravier_creeping_groups, only: creep_t, find_creep
   use gravier_proximal_law, only: proximal_law_t
   use gravier_newton, only: newton_t
@@ -56,6 +57,7 @@ program test_solver_parts
   call test_ratio_of_a_run()
   call test_fresh_start()
   call check_vain_impulses()
+  call check_tangential_shift()
   call check_stagnation()
   call check_creep(1)
   call check_creep(2)
@@ -625,9 +627,9 @@ contains
             if (round == 4) sub%hot(lane_of(c), 3, block_of(c)) = 2.0_dp
             if (round == 3 .and. sub%hot(lane_of(c), 1, block_of(c)) > 0.0_dp) sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
           end do
-          now(s)%value = sub%impulse
         end associate
       end do
+      call copy_impulses(sim%problem, now)
       call check_close(speed_against(sim%problem), merge(1.0_dp, 0.0_dp, mod(round, 2) == 1), 1.0e-12_dp, &
         & "speed of the walls against their impulses, less the gap over the step")
       call check(are_in_vain(sim%problem, none) .eqv. expected, "impulses that have grown: have they in vain?")
@@ -637,10 +639,41 @@ contains
       call check_verdict(sim, 1, merge(residual_in_vain, merge(residual_waits, residual_ends, round == 3), round == 1))
       do s = 1, size(now)
         call check(all(abs(sim%problem%sub(s)%impulse - now(s)%value) <= 0.0_dp), "impulses stay as they are")
+        sim%problem%sub(s)%impulse(:, :, :) = -1.0_dp
+      end do
+      call restore_impulses(sim%problem, now)
+      do s = 1, size(now)
+        call check(all(abs(sim%problem%sub(s)%impulse - now(s)%value) <= 0.0_dp), "impulses that were kept")
       end do
       call sim%free()
     end do
   end subroutine check_vain_impulses
+
+  !> A shift along the tangent, as of tangential restitution, works against the tangential impulse.
+  subroutine check_tangential_shift()
+    type(simulation_t) :: sim
+    real(dp) :: expected
+    integer :: s, c
+
+    call make_column(1, 1, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0, tangential_restitution = 0.5 /"//newline// &
+      & "&solver method = 'nscdd' /", sim)
+    expected = 0.0_dp
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s), row => sim%problem%kernels%row)
+        call check(row%shift_t > 0, "the law has a shift along the tangent")
+        do c = 1, sub%n_contacts
+          ! nothing from the floor
+          if (abs(sub%hot(lane_of(c), 2, block_of(c))) > 0.5_dp) cycle
+          sub%impulse(lane_of(c), 1:2, block_of(c)) = [1.0_dp, 0.2_dp]
+          sub%hot(lane_of(c), row%shift, block_of(c)) = 0.1_dp
+          sub%hot(lane_of(c), row%shift_t, block_of(c)) = -0.8_dp
+          expected = 0.06_dp/sqrt(1.04_dp)
+        end do
+      end associate
+    end do
+    call check_close(speed_against(sim%problem), comm%highest(expected), 1.0e-12_dp, "speed of a shift along the tangent")
+    call sim%free()
+  end subroutine check_tangential_shift
 
   !> The verdict on a residual within its tolerance after some iterations.
   subroutine check_verdict(sim, iterations, expected)

@@ -10,7 +10,7 @@ program test_velocity_error
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_vain_impulses, only: kept_impulses_t
+  use gravier_kept_impulses, only: kept_impulses_t
   use gravier_test_impulses, only: test_impulses_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
@@ -46,6 +46,7 @@ program test_velocity_error
   call test_decomposition()
   call test_layers(1)
   call test_layers(4)
+  call test_cuts_of_layers()
   call test_pauses()
   call test_passes_kept(1)
   call test_passes_kept(4)
@@ -510,6 +511,31 @@ contains
     call check_close(sweeps, 0.0_dp, 0.0_dp, "no pass on what is not deep")
     call sim%free()
   end subroutine test_layers
+
+  !> A cut through the first disk of a layer: in one of its subdomains that disk has a contact of the layer above alone. It moves in
+  !> both all the same, and no load is lost.
+  subroutine test_cuts_of_layers()
+    type(simulation_t) :: sim
+    real(dp) :: sweeps, fastest
+    logical :: carried
+    integer :: count, s
+
+    ! the cut passes through another place of a layer with each number
+    do count = 100, 110, 2
+      call make(count, 2, sim)
+      call carry_loads(sim%problem, 25.0_dp, sim%method%work, sweeps, carried)
+      call sim%problem%evaluate()
+      fastest = 0.0_dp
+      do s = 1, size(sim%problem%sub)
+        associate (sub => sim%problem%sub(s))
+          fastest = max(fastest, maxval(abs(sub%v_global(2, 1:sub%n_grains))))
+        end associate
+      end do
+      call check(carried .and. fastest <= 0.5_dp*gravity*step, "fastest disk of a column of "//to_text(count)//" over g h: "// &
+        & to_text(fastest/(gravity*step), 3))
+      call sim%free()
+    end do
+  end subroutine test_cuts_of_layers
 
   !> A step makes no pass while the stepper pauses. One from which the solve goes on ends the row of those that were given up.
   subroutine test_pauses()

@@ -89,21 +89,40 @@ contains
   subroutine test_held()
     class(method_t), allocatable :: method
     type(held_list_t) :: plain, momentum, newton
-    integer :: k, bytes
 
     call make_method("nscdd", method_options_t(), method)
     call method%held(3, 6, plain)
     call check_equal(plain%n, 0, "nothing without momentum")
     call make_method("nscdd", method_options_t(acceleration=.true.), method)
     call method%held(3, 6, momentum)
-    bytes = 0
-    do k = 1, momentum%n
-      bytes = bytes + momentum%item(k)%bytes*momentum%item(k)%values
-    end do
-    call check_equal(bytes, 8*(3 + 6), "bytes of momentum")
+    call check_equal(bytes_of("nscdd", .true.), 8*(3 + 6), "bytes of momentum")
+    call check_equal(bytes_of("schwarz_ec", .false.), 8*(3*3 + 6 + 3), "bytes of an enriched matrix and a safeguard")
+    call check_equal(bytes_of("schwarz_ec", .true.), 8*(3*3 + 6 + 3 + 3 + 6), "the same with momentum")
+    call check_equal(bytes_of("nscdd_ep", .false.), 8*(3*3 + 6 + 3), "bytes of NSCDD-EP on all contacts")
+    call check_equal(bytes_of("nscdd_ep", .false., active_only=.true.), 8*(3*3 + 6 + 3 + 3 + 6), "bytes of NSCDD-EP with feedback")
     call make_method("newton", method_options_t(), method)
     call method%held(3, 6, newton)
     call check(newton%n > momentum%n, "Newton's method holds what momentum does and more")
   end subroutine test_held
+
+  !> Bytes that a method says to hold for a contact of three components and a body of six.
+  integer function bytes_of(name, acceleration, active_only) result(bytes)
+    character(len=*), intent(in) :: name
+    logical, intent(in) :: acceleration
+    logical, intent(in), optional :: active_only
+    class(method_t), allocatable :: method
+    type(method_options_t) :: options
+    type(held_list_t) :: held
+    integer :: k
+
+    options%acceleration = acceleration
+    if (present(active_only)) options%active_only = active_only
+    call make_method(name, options, method)
+    call method%held(3, 6, held)
+    bytes = 0
+    do k = 1, held%n
+      bytes = bytes + held%item(k)%bytes*held%item(k)%values
+    end do
+  end function bytes_of
 
 end program test_method_registry
