@@ -9,7 +9,7 @@ module gravier_time_stepper
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
-  use gravier_pass_backoff, only: pass_backoff_t
+  use gravier_backoff, only: backoff_t
   use gravier_solve, only: solve_control_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
     & solve_diverged, solve_unbounded
   use gravier_fallback, only: fallback_t
@@ -86,7 +86,7 @@ module gravier_time_stepper
     type(fallback_t) :: fallback
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
-    type(pass_backoff_t) :: pass_backoff
+    type(backoff_t) :: pass_backoff
     !> what the last solve tells the next one about when to check
     real(dp) :: figure_ratio = 0.0_dp
     !> where it is known
@@ -481,7 +481,7 @@ contains
     self%left = 0
     self%left_mass = 0.0_dp
     self%population = population_t()
-    self%pass_backoff = pass_backoff_t()
+    self%pass_backoff = backoff_t()
     self%figure_ratio = 0.0_dp
     self%fast = 0
     self%quiet = 0

@@ -95,6 +95,8 @@ contains
       text = "method '"//trim(simulation%config%solver%fallback)//"' took over "//counted(fallback%taken, "solve")// &
         & " that missed the "//goal_name(simulation)//", "//to_text(fallback%solved)//" of which then reached it, in "// &
         & counted(fallback%iterations, "iteration")
+      if (fallback%passed_over > 0) text = text//"; "//counted(fallback%passed_over, "further one")// &
+        & " it left alone, because too many before were in vain"
     end associate
   end function fallback_text
 

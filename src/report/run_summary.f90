@@ -87,7 +87,7 @@ contains
           & to_text(solver%max_iterations)//", or "//text
       else if (.not. allocated(fallback%method) .and. solver%method /= "newton" .and. .not. simulation%effects%rolling) then
         text = "&solver fallback = 'newton' takes over solves that stagnate"
-      else if (tally%stagnated > fallback%taken - fallback%solved .and. allocated(fallback%method)) then
+      else if (tally%stagnated > fallback%taken - fallback%solved + fallback%passed_over .and. allocated(fallback%method)) then
         text = "a larger &solver fallback_contacts, now "//to_text(solver%fallback_contacts)// &
           & ": Newton's method takes over solves of so many contacts at most"
       else

@@ -12,7 +12,8 @@ module gravier_checkpoint
   use gravier_insertion, only: insertion_words, insertion_record
   use gravier_inflow, only: given_words, given_record
   use gravier_population, only: population_words, population_record
-  use gravier_pass_backoff, only: pass_backoff_words, pass_backoff_record
+  use gravier_backoff, only: backoff_words, backoff_record
+  use gravier_fallback, only: fallback_words, fallback_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
@@ -41,7 +42,8 @@ contains
       & "insertion: "//insertion_record//", "//to_text(insertion_words)//" words"//newline// &
       & "given grains: "//given_record//", "//to_text(given_words)//" words"//newline// &
       & "population: "//population_record//", "//to_text(population_words)//" words"//newline// &
-      & "passes: "//pass_backoff_record//", "//to_text(pass_backoff_words)//" words"//newline// &
+      & "passes: "//backoff_record//", "//to_text(backoff_words)//" words"//newline// &
+      & "second method: "//fallback_record//", "//to_text(fallback_words)//" words"//newline// &
       & "solves: figure_ratio"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
@@ -61,7 +63,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8), allocatable :: words(:)
-    integer(i8) :: seen(population_words), passes(pass_backoff_words)
+    integer(i8) :: seen(population_words), passes(backoff_words), takeovers(fallback_words)
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
@@ -93,6 +95,8 @@ contains
     call file%write_array("population", seen, error)
     call simulation%pass_backoff%get_state(passes)
     call file%write_array("passes", passes, error)
+    call simulation%fallback%get_state(takeovers)
+    call file%write_array("second_method", takeovers, error)
     call file%write_scalar("figure_ratio", simulation%figure_ratio, error)
     call simulation%inflow%get_state(words)
     call file%write_array("insertions", words, error)
@@ -159,8 +163,10 @@ contains
     call load_insertions(simulation, file, path, error)
     call file%read_array("population", population_words, population_words, words, error)
     if (.not. allocated(error)) call simulation%population%set_state(words)
-    call file%read_array("passes", pass_backoff_words, pass_backoff_words, words, error)
+    call file%read_array("passes", backoff_words, backoff_words, words, error)
     if (.not. allocated(error)) call simulation%pass_backoff%set_state(words)
+    call file%read_array("second_method", fallback_words, fallback_words, words, error)
+    if (.not. allocated(error)) call simulation%fallback%set_state(words)
     call file%read_scalar("figure_ratio", simulation%figure_ratio, error)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written

@@ -2,21 +2,27 @@
 !> turn a strip of bonded ones; Newton's method does, at the price of factorisations, in problems that are not too large.
 module gravier_fallback
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_cell_response, only: respond
   use gravier_contact_problem, only: contact_problem_t
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_method, only: method_t
+  use gravier_backoff, only: backoff_t, backoff_words, backoff_record
   use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, &
     & solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
-  public :: fallback_t
+  public :: fallback_t, fallback_words, fallback_record
 
   !> Most iterations of the second method. Tens of factorisations bring most solves to their goal. Where friction leaves velocities
   !> undetermined, thousands of iterations do not help either. A solve that ended at `max_iterations` is taken over if it made at
   !> least so many itself; a smaller limit is one that the user has set on purpose.
   integer, parameter :: most_iterations = 2000
+
+  !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
+  integer, parameter :: fallback_words = 1 + backoff_words
+  character(len=*), parameter :: fallback_record = "met "//backoff_record
 
   type :: fallback_t
     !> the second method; not allocated where there is none
@@ -26,15 +32,22 @@ module gravier_fallback
     !> since this run began or went on from a checkpoint: solves taken over, those of them that reached their goal, and
     !> iterations that all of them took
     integer(i8) :: taken = 0, solved = 0, iterations = 0
+    !> since then: solves that it might have taken over, and did not because too many before them were in vain
+    integer(i8) :: passed_over = 0
+    !> solves that it might have taken over, since the first step
+    integer, private :: met = 0
+    type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
     procedure :: take_over => fallback_take_over
+    procedure :: get_state => fallback_get_state
+    procedure :: set_state => fallback_set_state
     procedure :: free => fallback_free
   end type fallback_t
 
 contains
 
-  !> Go on with a solve that has stagnated, or that made many iterations in vain. The impulses and the report are those of the
-  !> better end. Collective.
+  !> Go on with a solve that has stagnated, or that made many iterations in vain, unless too many like it were not solved in the
+  !> end. The impulses and the report are those of the better end. Collective.
   subroutine fallback_take_over(self, problem, control, report, error, exact, watch)
     class(fallback_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
@@ -51,6 +64,11 @@ contains
 
     if (allocated(error) .or. .not. allocated(self%method)) return
     if (.not. has_failed(report) .or. problem%n_contacts > self%most_contacts) return
+    self%met = self%met + 1
+    if (.not. self%backoff%allows(self%met)) then
+      self%passed_over = self%passed_over + 1
+      return
+    end if
     again = control
     again%layered = .false.
     again%figure_ratio = 0.0_dp
@@ -61,6 +79,7 @@ contains
     self%taken = self%taken + 1
     self%iterations = self%iterations + second%iterations
     if (second%status == solve_converged) self%solved = self%solved + 1
+    call self%backoff%note(self%met, tried=.true., kept=second%status == solve_converged)
     if (is_better(second, report)) then
       call join(report, second)
       return
@@ -122,7 +141,23 @@ contains
     report%n_trace = n + second%n_trace
   end subroutine join
 
-  !> Give back what the method holds.
+  pure subroutine fallback_get_state(self, words)
+    class(fallback_t), intent(in) :: self
+    integer(i8), intent(out) :: words(fallback_words)
+
+    words(1) = self%met
+    call self%backoff%get_state(words(2:))
+  end subroutine fallback_get_state
+
+  pure subroutine fallback_set_state(self, words)
+    class(fallback_t), intent(inout) :: self
+    integer(i8), intent(in) :: words(fallback_words)
+
+    self%met = narrow(words(1))
+    call self%backoff%set_state(words(2:))
+  end subroutine fallback_set_state
+
+  !> Give back what the method holds, and forget what it has met.
   subroutine fallback_free(self)
     class(fallback_t), intent(inout) :: self
 
@@ -133,6 +168,9 @@ contains
     self%taken = 0
     self%solved = 0
     self%iterations = 0
+    self%passed_over = 0
+    self%met = 0
+    self%backoff = backoff_t(forgiven=1)
   end subroutine fallback_free
 
 end module gravier_fallback

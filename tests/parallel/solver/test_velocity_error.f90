@@ -15,7 +15,7 @@ program test_velocity_error
   use gravier_velocity_error, only: velocity_error_t, copies_ready
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_layered_start, only: carry_loads
-  use gravier_pass_backoff, only: pass_backoff_words
+  use gravier_backoff, only: backoff_words
   use gravier_layer_trial, only: layer_trial_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -543,7 +543,7 @@ contains
     type(simulation_t) :: sim
     type(step_figures_t) :: figures
     type(error_t), allocatable :: error
-    integer(i8) :: words(pass_backoff_words)
+    integer(i8) :: words(backoff_words)
 
     call make(count, 1, sim)
     words(1) = 3

@@ -1,11 +1,11 @@
-!> When passes over layers are tried again after some were given up, and how that goes through a checkpoint.
-program test_pass_backoff
+!> When something costly is tried again after some tries were in vain, and how that goes through a checkpoint.
+program test_backoff
   use gravier_kinds, only: i8
-  use gravier_pass_backoff, only: pass_backoff_t, pass_backoff_words
+  use gravier_backoff, only: backoff_t, backoff_words
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
-  type(pass_backoff_t) :: backoff, again
-  integer(i8) :: words(pass_backoff_words)
+  type(backoff_t) :: backoff, again
+  integer(i8) :: words(backoff_words)
   integer :: step, tries
 
   call check(backoff%allows(0), "the first solve may try a pass")
@@ -29,8 +29,21 @@ program test_pass_backoff
   call check(again%allows(23), "one that a solve went on from ends the pause")
   call again%note(23, tried=.true., kept=.false.)
   call check(again%allows(24), "and patience is there again")
+  ! where one of use makes good one in vain alone, every other one of use keeps patience, and one in three does not
+  backoff = backoff_t(forgiven=1)
+  do step = 0, 99
+    call check(backoff%allows(step), "tries of which every other is of use")
+    call backoff%note(step, tried=.true., kept=mod(step, 2) == 1)
+  end do
+  tries = 0
+  do step = 100, 399
+    if (.not. backoff%allows(step)) cycle
+    tries = tries + 1
+    call backoff%note(step, tried=.true., kept=mod(tries, 3) == 0)
+  end do
+  call check(tries > 10 .and. tries < 40, "tries of which one in three is of use")
   ! a scene in which all are given up: 0 to 4, 7, 12, 21, 38, 71, 136, then every 65 steps
-  backoff = pass_backoff_t()
+  backoff = backoff_t()
   tries = 0
   do step = 0, 999
     if (.not. backoff%allows(step)) cycle
@@ -39,4 +52,4 @@ program test_pass_backoff
   end do
   call check_equal(tries, 24, "passes of 1000 steps where none is of use")
   call finish_checks()
-end program test_pass_backoff
+end program test_backoff
