@@ -19,7 +19,10 @@ module gravier_accuracy_input
   !> those that a solve has no use for
   character(len=*), parameter :: run_keys = "vary values reference samples quantities knee"
   !> groups that have no place in a variant: where results go, and those that stand several times or are made before
-  character(len=*), parameter :: other_groups = "output boundary sample material law insertion"
+  character(len=*), parameter :: other_groups = "output boundary sample material law insertion region"
+  !> what keys of variants and `vary` are
+  character(len=*), parameter :: key_text = &
+    & "a key of a case, but of &output, &boundary, &sample, &material, &law, &insertion or &region"
 
 contains
 
@@ -159,7 +162,7 @@ contains
       call take_text(study, item, study%vary, error)
       study%vary_group = group_of(study%vary)
       if (study%vary_group == "" .or. study%vary == "steps" .or. study%vary == "title") call refuse(study, item, &
-        & "a key of a case, but of &boundary, &sample, &insertion or &output, and not 'steps', which follow from 'step'", error)
+        & key_text//", and not 'steps', which follow from 'step'", error)
     case ("values")
       call split(item%value, study%values)
       if (size(study%values) == 0) call refuse(study, item, "values, with commas between", error)
@@ -366,7 +369,9 @@ contains
     change%instance = 1
     if (change%group == "") then
       call raise(error, status_input, study%file//": unknown key '"//excerpt(item%key)//"' in &"//item%group// &
-        & ": expected a key of a case, but of &boundary, &sample or &output")
+        & ": expected "//key_text)
+    else if (item%index /= "") then
+      call refuse(study, item, item%key//" without an index: with all its entries, which replace those of the case", error)
     else if (item%group == "variant" .and. (item%key == study%vary .or. (item%key == "steps" .and. study%vary == "step"))) then
       call refuse(study, item, "without it, since &study vary = '"//study%vary//"'", error)
     else if (change%group == "scene" .and. study%reference == "tight") then

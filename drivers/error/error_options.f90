@@ -2,6 +2,7 @@
 module gravier_error_options
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: to_text
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real
   use gravier_error_plan, only: plan_t, situation_t, start_cold, start_lost, start_turned, start_loose
   implicit none
@@ -68,6 +69,8 @@ contains
       end select
       k = k + 1
     end do
+    if (options%plan%every > options%plan%steps) call raise(error, status_input, "--every '"//to_text(options%plan%every)// &
+      & "': expected at most the number of --steps, "//to_text(options%plan%steps))
     if (options%file == "" .and. .not. options%help) call raise(error, status_input, "no input file; see gravier_error --help")
   end subroutine read_options
 
@@ -109,7 +112,8 @@ contains
 
     n = 0
     first = 1
-    do while (first <= len(list))
+    ! after a comma at the end there is an empty item
+    do while (first <= len(list) + 1)
       last = end_of_item(list, first)
       n = n + 1
       numbers(n) = positive_integer(list(first:last))
@@ -134,8 +138,9 @@ contains
 
     n = 0
     first = 1
-    if (list == "none") first = len(list) + 1
-    do while (first <= len(list))
+    if (list == "none") first = len(list) + 2
+    ! after a comma at the end there is an empty item
+    do while (first <= len(list) + 1)
       last = end_of_item(list, first)
       if (list(first:last) == "program") then
         plan%by_program = .true.
@@ -176,7 +181,7 @@ contains
       good = .false.
     end select
     if (.not. good) call raise(error, status_input, "--situations '"//item// &
-      & "': expected cold, program, lost:SHARE, turned:DEGREES or loose:SPEED, with a number > 0")
+      & "': expected cold, program, lost:FRACTION of at most 1, turned:DEGREES or loose:SPEED, with a number > 0")
   end subroutine read_situation
 
   !> Last character of the item of a list that begins at `first`.

@@ -136,8 +136,8 @@ contains
   end subroutine check_planar
 
   !> A number that sums of squares and products of a few of them survive. What is only compared, as a tolerance, is exempt, and
-  !> so are directions, of which ratios count: they have no unit, and are not coefficients of friction (>= 0). Numbers
-  !> that must be above 0 and are not have a message of their own.
+  !> so are directions, of which ratios count: they have no unit, are not coefficients of friction (>= 0), and not of a law.
+  !> Numbers that must be above 0 and are not have a message of their own.
   subroutine check_magnitude(report, config, key, error)
     type(report_t), intent(in) :: report
     type(config_t), target, intent(inout) :: config
@@ -145,7 +145,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(slot_t) :: slot
 
-    if (key%kind /= kind_real .or. (key%unit == "" .and. key%allowed /= ">= 0")) return
+    if (key%kind /= kind_real) return
+    if (key%unit == "" .and. key%allowed /= ">= 0" .and. key%group /= "law") return
     if (.not. is_given(report, key%group, key%name)) return
     slot = slot_of(config, key, report%instance)
     if (key%count == 1) then

@@ -15,7 +15,7 @@ module gravier_config_check_boundary
   use gravier_config_report, only: report_t, expect, expect_own_name, miss, is_given, shown_text, ordinal
   implicit none
   private
-  public :: check_boundaries, check_contact
+  public :: check_boundaries, check_contact, is_pivoting
 
   !> what `is_pivoting` wants
   character(len=*), parameter :: pivoting_text = "a finite real number >= 0; 0 where dimension = 2"

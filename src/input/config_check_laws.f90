@@ -11,6 +11,7 @@ module gravier_config_check_laws
   use gravier_config_slots, only: slot_t, slot_of, belongs
   use gravier_config_report, only: report_t, expect, expect_own_name, ordinal
   use gravier_config_laws, only: material_number, collect_laws
+  use gravier_config_check_boundary, only: is_pivoting
   implicit none
   private
   public :: check_materials, check_laws
@@ -139,6 +140,8 @@ contains
       if (index(keys(k)%allowed, ">= 0") == 1) holds = slot%real >= 0.0_dp
       if (index(keys(k)%allowed, "in ") == 1) holds = is_within(keys(k)%allowed, slot%real)
       call expect(report, holds, "law", trim(keys(k)%name), error)
+      if (keys(k)%name == "pivoting_friction") call expect(report, is_pivoting(config%scene%dimension, slot%real), "law", &
+        & "pivoting_friction", error, "a finite real number >= 0; 0 where dimension = 2")
     end do
   end subroutine check_values
 

@@ -67,6 +67,8 @@ contains
     associate (sample => config%sample)
       call expect(report, sample%preparation /= "settled" .or. config%scene%gravity(nd) < 0.0_dp, &
                   "sample", "preparation", error, "another one where gravity does not point down the last axis")
+      call expect(report, sample%preparation /= "settled" .or. config%scene%gravity_table == "", "scene", "gravity_table", error, &
+                  "none where preparation = 'settled': bodies come to rest under a constant gravity")
       call expect(report, sample%preparation /= "settled" .or. config%scene%period(nd) <= 0.0_dp, &
                   "sample", "preparation", error, "another one where the last axis is periodic")
       call expect(report, sample%preparation /= "compacted" .or. any(config%scene%period(:nd) <= 0.0_dp), &

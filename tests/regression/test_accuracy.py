@@ -238,6 +238,8 @@ class BadInput(Studies):
                 ({**solve}, r": &variant \(number 1\) name is missing", ("&variant method = 'nlgs' /",)),
                 ({**solve}, ": &variant name = 'a': expected a name of its own", ("&variant name = 'a' /", "&variant name = 'a' /")),
                 ({**solve}, ": &variant sweeps = 2: expected once, but it is given twice", ("&variant name = 'a', sweeps = 1, sweeps = 2 /",)),
+                ({**runs, "vary": "bins"}, ": &study vary = 'bins': expected a key of a case", ()),
+                ({**solve}, r": &variant gravity\(2\) = -10: expected gravity without an index: with all its entries, which replace those of the case", ("&variant gravity(2) = -10 /",)),
                 ({**solve}, ": unknown key 'directory' in &variant: expected a key of a case",
                  ("&variant name = 'a', directory = 'b' /",)),
                 ({**solve}, ": 'a' of case.nml: &solver method = 'nlsg': expected 'nlgs'", ("&variant name = 'a', method = 'nlsg' /",)))):

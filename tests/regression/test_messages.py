@@ -206,7 +206,7 @@ class Messages(RunTestCase):
                 (STUDY + "&variant name = '' /\n", ("expected a name",)),
                 (STUDY + "&variant sweeps = 2 /\n", ("&variant (number 1) name is missing",)),
                 (STUDY.replace("case = 'case.nml', ", ""), ("&study case",)),
-                (STUDY.replace("'tolerance'", "'steps'"), ("expected a key of a case, but of &boundary, &sample, &insertion or &output, and not 'steps'",)),
+                (STUDY.replace("'tolerance'", "'steps'"), ("expected a key of a case, but of &output, &boundary, &sample, &material, &law, &insertion or &region, and not 'steps'",)),
                 (STUDY.replace("'tolerance', values = 1e-3, 1e-4", "'step', values = 7e-4"), ("expected steps that divide the duration",))):
             write(self.here("study.nml"), text)
             self.has(self.run_program("study.nml", program="gravier_accuracy"), words)

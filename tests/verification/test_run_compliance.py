@@ -249,6 +249,11 @@ class Input(ComplianceScene):
                                      ("stiffness_ratio", 0.0, "> 0"), ("pull_off_force", -1.0, ">= 0")):
             text = self.refused(f"{key} {value}", **{"kind": "elastic", "normal_stiffness": 1e4, key: value})
             self.assertIn(f"&law (the 1st) {key} = {value}: expected a finite real number {expected}", text)
+        for key in ("stiffness_ratio", "tangential_damping"):
+            self.assertIn(f"&law (the 1st) {key} = 1e+305: expected a number of at most 1e30 in size",
+                          self.refused(f"{key} huge", kind="elastic", normal_stiffness=1e4, **{key: 1e305}))
+        self.assertIn("&law (the 1st) pivoting_friction = 0.2: expected a finite real number >= 0; 0 where dimension = 2",
+                      self.refused("pivoting disks", kind="elastic", normal_stiffness=1e4, pivoting_friction=0.2))
         text = self.refused("poisson", kind="hertz", young_modulus=1e7, poisson_ratio=0.6, more={"scene": {"dimension": 3, "lattice_count": [2, 2, 2]}})
         self.assertIn("poisson_ratio = 0.6: expected a finite real number in [0, 0.5]", text)
 
@@ -258,6 +263,8 @@ class Input(ComplianceScene):
         self.assertIn(either, self.refused("both", kind="elastic", normal_stiffness=1.0, stiffness_number=1.0, stiffness_pressure=1.0))
         self.assertIn("stiffness_pressure: expected a pressure greater than 0",
                       self.refused("no pressure", kind="elastic", stiffness_number=1e4))
+        self.assertIn("stiffness_pressure = 1.0: expected 0 without a stiffness_number, which it would multiply",
+                      self.refused("pressure alone", kind="elastic", normal_stiffness=1.0, stiffness_pressure=1.0))
         self.assertIn("kind = 'hertz': expected a law that holds in 2D", self.refused("disks", kind="hertz", young_modulus=1e7))
         self.assertIn("fclib_step = 1: expected none where contacts are compliant",
                       self.refused("fclib", kind="elastic", normal_stiffness=1e4, more={"output": {"fclib_step": 1}}))

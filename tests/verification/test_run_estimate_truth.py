@@ -70,11 +70,15 @@ class Program(RunTestCase):
         directory = self.here("refused")
         os.makedirs(directory, exist_ok=True)
         write(os.path.join(directory, "case.nml"), namelist(COLUMN))
-        for options, said in ((["--situations", "warm"], "--situations 'warm': expected cold, program, lost:SHARE"),
+        for options, said in ((["--situations", "warm"], "--situations 'warm': expected cold, program, lost:FRACTION of at most 1"),
                               (["--situations", "lost:2"], "--situations 'lost:2': expected"),
                               (["--iterations", "8,4"], "--iterations '8,4': expected integers >= 1 in ascending order"),
                               (["--tight", "0"], "--tight '0': expected a finite real number > 0"),
                               (["--steps"], "--steps '': expected an integer >= 1"),
+                              (["--situations", ""], "--situations '': expected cold"), (["--situations", "cold,"], "--situations '': expected cold"),
+                              (["--iterations", "4,8,"], "--iterations '4,8,': expected integers >= 1 in ascending order"),
+                              (["--every", "2"], "--every '2': expected at most the number of --steps, 0"),
+                              (["--steps", "3", "--every", "4"], "--every '4': expected at most the number of --steps, 3"),
                               (["--fast"], "unknown option --fast"), (["other.nml"], "more than one input file")):
             run = gravier("case.nml", *options, directory=directory, program="gravier_error")
             self.assert_status(run, 2)

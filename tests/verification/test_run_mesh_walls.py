@@ -383,6 +383,30 @@ class MeshWalls(RunTestCase):
                 self.same(wanted, found)
                 self.assertTrue(np.any(found.all("bodies/image") != 0))
 
+    def test_images_keep_their_springs(self):
+        """A disk on the two ends of one facet, across a side of the cell: each end keeps its tangential spring, as where the facet lies in the
+        middle of the cell, or is cut in two."""
+        found = {}
+        for title, lines, place in (("across", [(0.1, 0.9)], 0.0), ("cut", [(0.1, 0.5), (0.5, 0.9)], 0.0), ("within", [(-0.4, 0.4), (0.6, 1.4)], 0.5)):
+            points = [x for line in lines for x in line]
+            here = self.here(f"images {title}")
+            os.makedirs(here)
+            write(os.path.join(here, "wall.obj"), "".join(f"v {x} 0 0\n" for x in points)
+                  + "".join(f"l {2 * k + 1} {2 * k + 2}\n" for k in range(len(lines))))
+            write(os.path.join(here, "disk.csv"), f"id,shape,x,y,radius,material\n1,grain,{place},0.1733,0.2,1\n")
+            run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "disk.csv", "density": 1000.0, "gravity": [0.0, -10.0],
+                                      "wall_material": "m", "period": [1.0, 0.0] if title != "within" else [0.0, 0.0]},
+                            "material": [{"name": "m"}],
+                            "law": [{"materials": ["m"], "kind": "elastic", "friction": 0.5, "normal_stiffness": 1e5}],
+                            "boundary": [{"shape": "mesh", "name": "wall", "file": "wall.obj", "material": "m"}],
+                            "time": {"step": 5e-4, "steps": 600}, "solver": {"criterion": "residual", "tolerance": 1e-10},
+                            "output": {"directory": "results", "every": 600}}, directory=here)
+            self.assert_status(run, 0)
+            bodies = run.results()
+            found[title] = [bodies[f"/steps/600/bodies/{name}"][0, 1] for name in ("position", "velocity")]
+        for title in ("cut", "within"):
+            np.testing.assert_allclose(found["across"], found[title], rtol=1e-9, err_msg=title)
+
     def test_rest(self):
         """A heap of bodies at rest in a bowl of triangles starts its steps from the last ones: few iterations, one manifold at each place."""
         angle = 2.0 * np.pi * np.arange(25) / 24

@@ -281,6 +281,8 @@ class Samples(RunTestCase):
             "table": (merged(CASES["table"], {"sample": {"radius_table": "missing.csv"}}), "missing.csv"),
             "closed": (merged(CASES["periodic"], {"sample": {"preparation": "compacted", "pressure": 1.0}}),
                        "&sample preparation = 'compacted': expected another one where every axis is periodic"),
+            "tilted": (merged(CASES["settled"], {"scene": {"gravity_table": "gravity.csv"}}),
+                       "&scene gravity_table = 'gravity.csv': expected none where preparation = 'settled'"),
         }
         del refused["lattice"][0]["sample"]
         for name, (case, text) in refused.items():

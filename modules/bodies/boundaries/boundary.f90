@@ -265,6 +265,7 @@ contains
         end do
       end do
     end do
+    if (any(images > 0)) call near%number_images()
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
 

@@ -150,14 +150,17 @@ contains
       word = lower(lines%word())
       select case (word)
       case ("facet")
+        if (open_facet) call refuse("a facet within a facet, but endfacet was expected")
         in_facet = 0
         open_facet = .true.
       case ("endfacet")
+        if (.not. open_facet) call refuse("endfacet without a facet")
         open_facet = .false.
         if (in_facet /= 3) call refuse("a facet of "//to_text(in_facet)//" corners, but 3 were expected")
       case ("vertex")
         in_facet = in_facet + 1
         n = n + 1
+        if (.not. open_facet) call refuse("a corner outside of a facet")
         if (n > size(points, 2)) call refuse("a corner outside of facets of three")
         if (allocated(error)) return
         do d = 1, 3
@@ -165,6 +168,8 @@ contains
           call read_real(word, points(d, n), how)
           if (how /= size_usual .and. how /= size_tiny) call refuse(""""//word//""", but a number was expected")
         end do
+        word = lines%word()
+        if (word /= "") call refuse(""""//word//""" after the three numbers of a corner")
       case ("", "solid", "outer", "endloop", "endsolid")
         continue
       case default

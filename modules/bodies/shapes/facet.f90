@@ -11,6 +11,9 @@ module gravier_facet
   integer, parameter :: within = 0, on_side = 1, at_corner = 2
 
   !> Facets near a point, seen from there.
+  !> between the numbers of two images of a facet: what is left of it in a part of an integer differs from one to the next
+  integer, parameter :: image_stride = 16411
+
   type :: near_facets_t
     integer :: n = 0
     !> numbers of the facets, in the order in which they were found (n)
@@ -21,10 +24,22 @@ module gravier_facet
     real(dp) :: tolerance = 0.0_dp
   contains
     procedure :: add => near_facets_add
+    procedure :: number_images => near_facets_number_images
     procedure :: join_lines => near_facets_join_lines
   end type near_facets_t
 
 contains
+
+  !> Give the second and further images of a facet numbers of their own: by these the points where a body touches them are known
+  !> again. Images have an order in which they are found.
+  pure subroutine near_facets_number_images(self)
+    class(near_facets_t), intent(inout) :: self
+    integer :: k
+
+    do k = self%n, 2, -1
+      self%number(k) = self%number(k) + image_stride*count(self%number(1:k - 1) == self%number(k))
+    end do
+  end subroutine near_facets_number_images
 
   !> Add a facet.
   pure subroutine near_facets_add(self, number, corner)

@@ -39,7 +39,7 @@ module gravier_elastic_law
   !> keys of all laws with springs
   type(declared_key_t), parameter :: spring_keys(*) = &
     & [declared_key_t("spring_restitution", "1.0", "in (0, 1]", "", &
-    &                 "part of its velocity that an impact returns; it sets the dashpot of the normal spring"), &
+    &   "part of its velocity that an impact returns, about 1e-4 at least; it sets the dashpot of the normal spring"), &
     &  declared_key_t("tangential_damping", "0.0", ">= 0", "", "tangential dashpot over the normal one"), &
     &  declared_key_t("spring_theta", "1.0", "in [0.5, 1]", "", &
     &    "weight of the end of the step in the forces of the springs: 0.5 keeps energy, 1 damps what the step does not resolve"), &
@@ -112,6 +112,9 @@ contains
     else if (self%number > 0.0_dp .and. .not. self%pressure > 0.0_dp) then
       self%fault_key = "stiffness_pressure"
       self%fault_expected = "a pressure greater than 0, which the stiffness_number multiplies"
+    else if (self%pressure > 0.0_dp .and. .not. self%number > 0.0_dp) then
+      self%fault_key = "stiffness_pressure"
+      self%fault_expected = "0 without a stiffness_number, which it would multiply"
     end if
   end subroutine elastic_set
 

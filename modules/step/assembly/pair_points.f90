@@ -289,9 +289,11 @@ contains
     taken(:) = key(1, :) == 0
     do k = 1, points%n
       do l = 1, size(load)
-        if (any(key(:, l) /= points%key(:, k))) cycle
+        ! images of one facet have one key, and keep their order
+        if (any(key(:, l) /= points%key(:, k)) .or. taken(l)) cycle
         source(k) = l
         taken(l) = .true.
+        exit
       end do
     end do
     as_many = count(source == 0) == count(.not. taken)

@@ -181,6 +181,14 @@ contains
       & "a.stl: line 5: ""nan"", but a number was expected")
     call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertices"//n, &
       & "a.stl: line 6: ""vertices"", but facet, outer loop, vertex, endloop, endfacet or endsolid was expected")
+    call refuse_stl("solid"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n, &
+      & "a.stl: line 2: a corner outside of a facet")
+    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"facet"//n//"vertex 0 0 1"//n, &
+      & "a.stl: line 5: a facet within a facet, but endfacet was expected")
+    call refuse_stl("solid"//n//"endfacet"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n, &
+      & "a.stl: line 2: endfacet without a facet")
+    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1 7"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n, &
+      & "a.stl: line 3: ""7"" after the three numbers of a corner")
     call write_binary("b.stl", 5)
     call read_stl("b.stl", found, first, corner, error)
     call check_message(error, "b.stl: no STL file: it is no text that begins with ""solid"", and its length of 284 bytes "// &
