@@ -29,9 +29,9 @@ COUNTS = {2: [14, 14], 3: [6, 10, 6]}
 SPACING = 1.28
 #: inertial numbers, each with the strain over which means are taken: slower flows take more steps
 NUMBERS = {2: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 6.4, 1e-2: 6.4, 3e-2: 6.4, 1e-1: 6.4},
-           3: {1e-4: 0.4, 3e-4: 0.4, 1e-3: 0.8, 3e-3: 0.8, 1e-2: 1.6, 3e-2: 1.6, 1e-1: 1.6}}
+           3: {1e-4: 0.4, 3e-4: 0.4, 1e-3: 0.8, 3e-3: 0.8, 1e-2: 16.0, 3e-2: 16.0, 1e-1: 32.0, 3e-1: 32.0}}
 LEAST = {2: 1e-3, 3: 3e-3}
-QUICK = {2: (1e-2, 1e-1), 3: (1e-1,)}
+QUICK = {2: {1e-2: 1.6, 1e-1: 1.6}, 3: {1e-1: 0.4}}
 #: flows up to here are slow: errors of their solves are compared with the rate times ten diameters, as between walls so far apart
 SLOW = 1e-3
 #: what the publications say of disks, and of slow flow of spheres
@@ -39,8 +39,8 @@ DISKS = {"mu": (0.25, 1.1), "phi": (0.81, -0.3)}
 SPHERES = {"mu": 0.357, "phi": 0.596}
 #: accepted differences; that of the friction of the fastest flow, whose shocks are inelastic here
 NEAR, FAST, NEAR_FAST = {"mu": 0.05, "phi": 0.02}, 0.05, 0.12
-#: strain left out at the start, and the part of the strain taken that a quick run takes
-START, QUICK_PART = 0.4, 0.25
+#: strain left out at the start
+START = 0.4
 
 
 def step_of(number):
@@ -73,16 +73,18 @@ def flow(folder, dimension, number, taken):
     return np.mean(mu), np.mean(phi), np.std(mu) / np.sqrt(8.0), np.std(phi) / np.sqrt(8.0)
 
 
-def power_law(numbers, values):
-    """mu_0, s and n of mu = mu_0 + s I^n by least squares, n between 0.1 and 1.5."""
-    best = None
-    for n in np.linspace(0.1, 1.5, 281):
-        columns = np.stack([np.ones(len(numbers)), np.asarray(numbers)**n], axis=1)
-        fit, *_ = np.linalg.lstsq(columns, np.asarray(values), rcond=None)
-        miss = np.sum((columns @ fit - values)**2)
-        if best is None or miss < best[0]:
-            best = (miss, fit[0], fit[1], n)
-    return best[1:]
+def power_law(numbers, values, errors):
+    """mu_0, s and n of mu = mu_0 + s I^n by least squares, each value weighted by its standard error, n between 0.1 and 1.5; and the standard
+    error of n, or more where the values scatter by more than their errors about the law."""
+    exponents, misses, fits = np.linspace(0.1, 1.5, 281), [], []
+    for n in exponents:
+        columns = np.stack([np.ones(len(numbers)), np.asarray(numbers)**n], axis=1) / np.asarray(errors)[:, None]
+        fit, *_ = np.linalg.lstsq(columns, values / errors, rcond=None)
+        misses.append(np.sum((columns @ fit - values / errors)**2))
+        fits.append(fit)
+    best = int(np.argmin(misses))
+    near = exponents[misses <= misses[best] + max(1.0, misses[best] / max(1, len(numbers) - 3))]
+    return *fits[best], exponents[best], 0.5 * np.ptp(near)
 
 
 def draw(path, found):
@@ -118,14 +120,14 @@ def compare(table, found):
             table.add("spheres", f"{key} at I = {number:g}, standard error {error:.0e}", value, expected, None, NEAR[key] if slow else None)
     if len(found[3]) > 3:
         rows = np.array(found[3])
-        mu_0, s, n = power_law(rows[:, 0], rows[:, 1])
-        table.add("spheres", f"exponent of mu = {mu_0:.3f} + {s:.2f} I^n", n, 0.28)
+        mu_0, s, n, error = power_law(rows[:, 0], rows[:, 1], rows[:, 3])
+        table.add("spheres", f"exponent of mu = {mu_0:.3f} + {s:.2f} I^n, standard error {error:.0e}", n, 0.28)
 
 
 def main():
     parser = OneLineParser(description=__doc__)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/rheology"), help="default: out/rheology")
-    parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and a quarter of the strain")
+    parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and less strain")
     parser.add_argument("--least", type=float, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
                         "numbers (1e-3 of disks, 3e-3 of spheres); the least there are is 1e-4")
     options = parser.parse_args()
@@ -135,9 +137,8 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for dimension in (2, 3):
-        numbers = QUICK[dimension] if options.quick else [number for number in NUMBERS[dimension] if number >= least[dimension]]
-        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number,
-                                           NUMBERS[dimension][number] * (QUICK_PART if options.quick else 1.0))) for number in numbers]
+        strains = QUICK[dimension] if options.quick else {number: taken for number, taken in NUMBERS[dimension].items() if number >= least[dimension]}
+        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number, taken)) for number, taken in strains.items()]
     table = Table()
     compare(table, found)
     write_csv(options.out / "study_rheology.csv", {name: [row[k] for row in table.rows] for k, name in enumerate(table.HEADER)})

@@ -20,8 +20,15 @@ class Rheology(StudyTestCase):
     def test_power_law(self):
         numbers = np.array([1e-4, 1e-3, 1e-2, 3e-2, 1e-1])
         for mu_0, s, n in ((0.36, 0.3, 0.5), (0.25, 1.1, 1.0), (0.3, 0.2, 0.28)):
-            found = study_rheology.power_law(numbers, mu_0 + s * numbers**n)
+            errors = np.array([0.01, 0.01, 0.001, 0.001, 0.001])
+            *found, error = study_rheology.power_law(numbers, mu_0 + s * numbers**n, errors)
             np.testing.assert_allclose(found, (mu_0, s, n), atol=0.02)
+            # a value counts by its error
+            *found, _ = study_rheology.power_law(numbers, mu_0 + s * numbers**n + [0.05, 0.0, 0.0, 0.0, 0.0], np.array([1.0, *errors[1:]]))
+            np.testing.assert_allclose(found, (mu_0, s, n), atol=0.02)
+            self.assertLess(error, 0.1)
+            *_, scattered = study_rheology.power_law(numbers, mu_0 + s * numbers**n + [0.0, 0.0, 0.01, -0.01, 0.0], errors)
+            self.assertGreater(scattered, error)
 
     def test_bounds(self):
         """Values of the publications are within the bounds; those beyond are not."""
