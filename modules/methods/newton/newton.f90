@@ -280,7 +280,7 @@ contains
 
     if (self%acceleration%on .or. .not. self%least < self%least_swept) then
       do s = 1, size(self%part)
-        ! those of accelerated sweeps are relaxed
+        ! operators of accelerated sweeps are relaxed
         if (.not. self%acceleration%on) call problem%sub(s)%share_masses(problem%kernels, .true.)
         problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
         problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity

@@ -56,13 +56,13 @@ contains
 end module test_fallback_schemes
 
 program test_fallback
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_nlgs, only: nlgs_t
   use gravier_solve, only: solve_control_t, solve_report_t, solve_converged, solve_exhausted, solve_stagnated, solve_unbounded
-  use gravier_fallback, only: fallback_t
+  use gravier_fallback, only: fallback_t, fallback_words
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use test_fallback_schemes, only: scaling_t
@@ -81,6 +81,7 @@ program test_fallback
   call test_worse(1.5_dp, "worse")
   call test_worse(1.0e3_dp, "diverged")
   call test_better()
+  call test_pauses()
   call test_trace()
   call test_words()
   call finish_checks()
@@ -275,6 +276,40 @@ contains
     call check_equal(int(report%creep%contacts), 11, "nearer: contacts that creep, of the first")
     call sim%free()
   end subroutine test_better
+
+  !> After five takeovers in vain two solves are left alone, also by a run that goes on from a checkpoint; one that is solved counts
+  !> against one in vain.
+  subroutine test_pauses()
+    type(simulation_t) :: sim
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(fallback_t) :: fallback, again
+    type(error_t), allocatable :: error
+    integer(i8) :: words(fallback_words)
+    integer :: k, made
+
+    call prepare(sim, control, report)
+    control%max_iterations = 2
+    allocate (fallback%method, source=scaling_t(factor=1.5_dp))
+    fallback%most_contacts = 2
+    do k = 1, 6
+      call fallback%take_over(sim%problem, control, report, error)
+      made = report%iterations
+    end do
+    call check_equal(int(fallback%taken), 5, "takeovers in vain before a pause")
+    call check_equal(int(fallback%passed_over), 1, "the next solve is left alone")
+    call check_equal(report%status, solve_stagnated, "and stays what it was")
+    call fallback%get_state(words)
+    allocate (again%method, source=scaling_t(factor=1.5_dp))
+    again%most_contacts = 2
+    call again%set_state(words)
+    do k = 1, 2
+      call again%take_over(sim%problem, control, report, error)
+      call check_equal(int(again%taken), k - 1, "the one after it too, after a restart")
+      call check(report%iterations > made .eqv. k == 2, "a solve that is left alone costs nothing")
+    end do
+    call sim%free()
+  end subroutine test_pauses
 
   !> The checks of both solves in one trace, whose iterations and seconds go on.
   subroutine test_trace()
