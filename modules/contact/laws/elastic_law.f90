@@ -106,7 +106,10 @@ contains
     call self%set_springs(values(1), values(6:11), 1.0_dp)
     self%sees_velocity = .false.
     self%fault_key = ""
-    if (self%stiffness > 0.0_dp .eqv. self%number > 0.0_dp) then
+    if (self%stiffness > 0.0_dp .and. self%number > 0.0_dp) then
+      self%fault_key = "stiffness_number"
+      self%fault_expected = "0 beside a normal_stiffness, which is given too"
+    else if (.not. (self%stiffness > 0.0_dp .or. self%number > 0.0_dp)) then
       self%fault_key = "normal_stiffness"
       self%fault_expected = "either a normal_stiffness or a stiffness_number greater than 0"
     else if (self%number > 0.0_dp .and. .not. self%pressure > 0.0_dp) then

@@ -100,7 +100,8 @@ contains
   !> Keep the elongations of the springs of a solved problem with the pairs of the lists, as they are at the q_m of the next step;
   !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its
   !> velocity and its force: an elongation that fitted the force would move away from the bodies step by step. One that slides has
-  !> the elongation that its force has, and one that carries nothing forgets.
+  !> the elongation that its force has, and one that carries nothing forgets. In space an elongation turns with the bodies about the
+  !> normal.
   subroutine conclude_springs(problem, h, halo)
     type(contact_problem_t), intent(in) :: problem
     !> [s]
@@ -130,6 +131,7 @@ contains
           if (nd == 2) then
             list%spring(1, sub%source(c)) = elongation(1)
           else
+            call turn_with_bodies(sub, problem%kernels, c, h, elongation)
             call contact_tangents(sub%hot, c, t, s)
             list%spring(:, sub%source(c)) = elongation(1)*t + elongation(2)*s
           end if
@@ -138,6 +140,26 @@ contains
       end associate
     end do
   end subroutine conclude_springs
+
+  !> Turn an elongation about the normal as its bodies do in a time h: by the mean of their spins. Where bodies do not turn it stays.
+  pure subroutine turn_with_bodies(sub, kernels, c, h, elongation)
+    type(subproblem_t), intent(in) :: sub
+    type(kernels_t), intent(in) :: kernels
+    integer, intent(in) :: c
+    !> negative: back [s]
+    real(dp), intent(in) :: h
+    !> along t and s [m]
+    real(dp), intent(inout) :: elongation(2)
+    real(dp) :: angle, along_t
+
+    if (kernels%nv == kernels%nd) return
+    associate (n => sub%hot(lane_of(c), 1:3, block_of(c)), i => sub%pair(1, c), j => sub%pair(2, c))
+      angle = 0.5_dp*h*sum(n*(sub%v_global(kernels%nd + 1:, i) + sub%v_global(kernels%nd + 1:, j)))
+    end associate
+    along_t = cos(angle)*elongation(1) - sin(angle)*elongation(2)
+    elongation(2) = sin(angle)*elongation(1) + cos(angle)*elongation(2)
+    elongation(1) = along_t
+  end subroutine turn_with_bodies
 
   !> Whether a contact that presses uses its friction, and slides.
   pure logical function uses_its_friction(sub, kernels, c)
@@ -181,6 +203,7 @@ contains
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
           elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
+          if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, -h, elongation)
           do d = 2, nd
             if (slides) then
               elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
