@@ -141,7 +141,7 @@ contains
     end do
   end subroutine conclude_springs
 
-  !> Turn an elongation about the normal as its bodies do in a time h: by the mean of their spins. Where bodies do not turn it stays.
+  !> Turn an elongation about the normal as its bodies do in a time h: by the mean of their spins. If bodies do not turn, it stays.
   pure subroutine turn_with_bodies(sub, kernels, c, h, elongation)
     type(subproblem_t), intent(in) :: sub
     type(kernels_t), intent(in) :: kernels
