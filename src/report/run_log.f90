@@ -333,13 +333,17 @@ contains
   subroutine run_log_look(self, report)
     class(run_log_t), intent(inout) :: self
     type(solve_report_t), intent(in) :: report
-    character(len=:), allocatable :: text
+    !> a figure above is of a velocity error that no check has estimated
+    real(dp), parameter :: not_estimated = 1.0e100_dp
+    character(len=:), allocatable :: text, figure
     real(dp) :: seconds
 
     if (self%comm%rank /= 0) return
     if (.not. self%progress%solve_line_due(seconds)) return
+    figure = to_text(report%figure, 2)
+    if (report%figure > not_estimated) figure = "not known"
     text = "step "//to_text(self%next_step)//" is being solved: "//to_text(report%iterations)//" iterations in "// &
-      & duration_text(seconds)//", "//self%figure_name//" "//to_text(report%figure, 2)//" at the last check, "//self%goal_name// &
+      & duration_text(seconds)//", "//self%figure_name//" "//figure//" at the last check, "//self%goal_name// &
       & " "//to_text(report%goal, 2)
     if (self%live) then
       call note_line(self, "            "//text, self%unwritten)
