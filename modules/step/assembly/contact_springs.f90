@@ -101,7 +101,7 @@ contains
   !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its
   !> velocity and its force: an elongation that fitted the force would move away from the bodies step by step. One that slides has
   !> the elongation that its force has, and one that carries nothing forgets. In space an elongation turns with the bodies about the
-  !> normal.
+  !> normal, half of the way before they stretch it and half after: so it does no work.
   subroutine conclude_springs(problem, h, halo)
     type(contact_problem_t), intent(in) :: problem
     !> [s]
@@ -123,15 +123,17 @@ contains
           associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
             slides = uses_its_friction(sub, problem%kernels, c)
+            elongation(:) = own%stretch(1:2)
+            if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, 0.5_dp*h, elongation)
             do d = 2, nd
-              elongation(d - 1) = own%stretch(d - 1) + h*v(q, d, g)
+              elongation(d - 1) = elongation(d - 1) + h*v(q, d, g)
               if (slides) elongation(d - 1) = own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
           end associate
           if (nd == 2) then
             list%spring(1, sub%source(c)) = elongation(1)
           else
-            call turn_with_bodies(sub, problem%kernels, c, h, elongation)
+            call turn_with_bodies(sub, problem%kernels, c, 0.5_dp*h, elongation)
             call contact_tangents(sub%hot, c, t, s)
             list%spring(:, sub%source(c)) = elongation(1)*t + elongation(2)*s
           end if
@@ -203,7 +205,7 @@ contains
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
           elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
-          if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, -h, elongation)
+          if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, -0.5_dp*h, elongation)
           do d = 2, nd
             if (slides) then
               elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
