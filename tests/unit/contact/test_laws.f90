@@ -363,7 +363,7 @@ contains
     call set_law(law, "friction", [0.3_dp])
     call check_equal(law%fault_key, "normal_stiffness", "no stiffness")
     call set_law(law, "normal_stiffness stiffness_number stiffness_pressure", [1.0_dp, 1.0_dp, 1.0_dp])
-    call check_equal(law%fault_key, "normal_stiffness", "two stiffnesses")
+    call check_equal(law%fault_key, "stiffness_number", "two stiffnesses")
     call set_law(law, "stiffness_number", [1.0_dp])
     call check_equal(law%fault_key, "stiffness_pressure", "a number without a pressure")
   end subroutine check_elastic
