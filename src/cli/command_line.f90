@@ -78,7 +78,7 @@ contains
     if (arguments%action <= action_check .and. arguments%file == "") &
       & call raise(error, status_input, "no input file; see gravier --help")
     if (arguments%action == action_keys .and. arguments%file /= "") call raise(error, status_input, &
-      & "an input file, "//arguments%file//", beside --keys, which shows the keys of all; see gravier --help")
+      & "an input file, "//arguments%file//", beside --keys, which shows the keys of every input file; see gravier --help")
   end subroutine read_arguments
 
   !> Word `k` of the command line.

@@ -99,7 +99,7 @@ contains
         & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
         & least//" in it", most_by_boundary*scales%smallest/scales%speed)
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
-      if (cell_warning(simulation, d) /= "") call warn(cell_warning(simulation, d))
+      call warn(cell_warning(simulation, d))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -130,8 +130,11 @@ contains
       call warn("&time step = "//figure(simulation%config%time%step)//" s: "//why//"; at most "//figure(most)//" s would do")
     end subroutine warn_step
 
+    !> Nothing where the line is empty.
     subroutine warn(line)
       character(len=*), intent(in) :: line
+
+      if (line == "") return
       text = text//"warning     "//line//newline
       number = number + 1
     end subroutine warn

@@ -249,9 +249,11 @@ contains
     real(dp), intent(in) :: x(:), reach
     type(near_facets_t), intent(inout) :: near
     real(dp) :: image(3), from(3)
-    integer :: images(3), i, j, k
+    !> `seen`: images of the surface that have facets there
+    integer :: images(3), i, j, k, before, seen
 
     near%n = 0
+    seen = 0
     call find_image(self, x, image)
     images(:) = merge(1, 0, self%period > 0.0_dp .and. .not. self%turns())
     do k = -images(3), images(3)
@@ -261,11 +263,13 @@ contains
           from(2) = image(2) + j*self%period(2)
           from(3) = image(3) + k*self%period(3)
           from(:) = from - self%surface%point
+          before = near%n
           call self%surface%find_facets(from, reach, near)
+          if (near%n > before) seen = seen + 1
         end do
       end do
     end do
-    if (any(images > 0)) call near%number_images()
+    if (seen > 1) call near%number_images()
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
 

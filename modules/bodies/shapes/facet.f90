@@ -11,7 +11,8 @@ module gravier_facet
   integer, parameter :: within = 0, on_side = 1, at_corner = 2
 
   !> Facets near a point, seen from there.
-  !> between the numbers of two images of a facet: what is left of it in a part of an integer differs from one to the next
+  !> Added to the number of a facet for each further image of it. Keys of points keep numbers modulo a power of two, of which this
+  !> is no multiple.
   integer, parameter :: image_stride = 16411
 
   type :: near_facets_t
