@@ -93,6 +93,9 @@ contains
       if (tally%steps_with_cores > 0) text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
         & " steps bodies overlapped by more than their roundings, in one step at most "// &
         & to_text(tally%most_cores)//" pairs"//newline
+      if (tally%steps_left_out > 0) text = text//"warning     in "//to_text(tally%steps_left_out)//" of "// &
+        & counted(tally%steps, "step")//" bodies touched each other or a mesh in more points than are kept, which are the "// &
+        & "deepest; at most "//counted(tally%most_left_out, "point")//" of a step were left out. Forces may be wrong there"//newline
       if (tally%steps_stretched > 0) text = text//"warning     in "//to_text(tally%steps_stretched)//" of "// &
         & counted(tally%steps, "step")//" intact bonds had gaps beyond those at which pairs are bonded, in one step at most "// &
         & to_text(tally%most_stretched)//": errors of solves add up to that, and a bond is lost where its pair is out of "// &

@@ -425,6 +425,27 @@ class MeshWalls(RunTestCase):
         self.assertGreater(motion.position[-1][:, 2].min(), 0.0)
         self.assertLess(np.abs(motion.velocity[-1][:, :3]).max(), 0.02)
 
+    def test_cones(self):
+        """A ball in the tip of a cone of 12 facets touches them all and stays on the axis. Of 100 facets 64 have a place: the log says so."""
+        for sides, left_out in ((12, 0), (100, 36)):
+            angle = 2.0 * np.pi * np.arange(sides + 1) / sides
+            cone = np.array([[[0.2 * np.cos(a), 0.2 * np.sin(a), 0.2], [0.2 * np.cos(b), 0.2 * np.sin(b), 0.2], [0.0, 0.0, 0.0]]
+                             for a, b in zip(angle[:-1], angle[1:])])
+            directory = prepare(self.here(f"cone {sides}"), 3, [self.ball([0.0, 0.0, 1.001 * RADIUS * np.sqrt(1.0 + np.cos(np.pi / sides)**2)
+                                                                          / np.cos(np.pi / sides)])])
+            write(os.path.join(directory, "wall.stl"), stl_text(cone))
+            case = shaped_case(3, [MESH], {"time": {"step": 1e-3, "steps": 200}, "output": {"every": 200}}, TIGHT)
+            del case["scene"]["shapes"]
+            run = run_case(case, 1, directory)
+            self.assert_status(run, 0)
+            motion = Motion(run)
+            self.assertEqual(len(motion.contacts()), sides - left_out)
+            self.assertEqual("in more points than are kept" in run.stdout, left_out > 0, run.stdout)
+            if left_out:
+                self.assertIn(f"at most {left_out} points of a step were left out", run.stdout)
+            else:
+                self.assertLess(np.abs(motion.velocity[-1][0, :2]).max(), 1e-9)
+
     def test_refused(self):
         """What no mesh can be is refused in one line with the file, before anything is computed."""
         rows = [self.ball([0.0, 0.0, RADIUS])]

@@ -11,8 +11,8 @@ module gravier_pair_places
   private
   public :: has_facets, repeat_pairs
 
-  !> facets of a boundary that a disk or a sphere touches at most, and a body with a shape, each in as many points as a plane
-  integer, parameter :: facets_of_ball = 8, facets_of_shape = 6
+  !> facets of a boundary that a body touches at most, each in as many points as a plane; a run says where points are left out
+  integer, parameter :: most_facets = 64
 
 contains
 
@@ -58,7 +58,7 @@ contains
         reach = bodies%radius(i) + rule%margin(norm2(bodies%velocity(1:bodies%nd, i))) + rule%alert_distance + &
           & rule%margin(norm2(boundaries(b)%velocity))
         call boundaries(b)%find_facets(bodies%position(:, i), reach, near)
-        points(p) = points(p)*min(near%n, merge(facets_of_shape, facets_of_ball, bodies%no > 0))
+        points(p) = points(p)*min(near%n, most_facets)
       end associate
     end do
     allocate (longer(sum(points)))

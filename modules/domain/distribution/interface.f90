@@ -32,6 +32,8 @@ module gravier_interface
     integer(i8) :: ghosts = 0
     !> pairs of pieces of bodies with shapes whose cores overlap
     integer(i8) :: overlapping_cores = 0
+    !> points in which bodies touch, but for which their pairs have no place
+    integer(i8) :: points_left_out = 0
     !> contacts whose intact bond is stretched
     integer(i8) :: stretched_bonds = 0
   end type interface_statistics_t
@@ -355,7 +357,7 @@ contains
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(inout) :: problem
     type(interface_statistics_t), intent(out) :: figures
-    integer(i8) :: counts(n_multiplicities + 7)
+    integer(i8) :: counts(n_multiplicities + 8)
     real(dp) :: extremes(4)
     integer :: s, c, k, m
 
@@ -386,6 +388,7 @@ contains
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%overlapping_cores
         counts(n_multiplicities + 7) = counts(n_multiplicities + 7) + sub%stretched_bonds
+        counts(n_multiplicities + 8) = counts(n_multiplicities + 8) + sub%points_left_out
       end associate
     end do
     call decomposition%comm%sum_counts(counts)
@@ -395,6 +398,7 @@ contains
     figures%interactions = counts(n_multiplicities + 1)
     figures%overlapping_cores = counts(n_multiplicities + 6)
     figures%stretched_bonds = counts(n_multiplicities + 7)
+    figures%points_left_out = counts(n_multiplicities + 8)
     figures%most_contacts = nint(extremes(1), i8)
     figures%least_contacts = nint(-extremes(2), i8)
     figures%neighbours = counts(n_multiplicities + 3)

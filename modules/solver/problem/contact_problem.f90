@@ -34,6 +34,8 @@ module gravier_contact_problem
     integer :: n_grouped = 0
     !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
     integer :: overlapping_cores = 0
+    !> points in which bodies touch, but for which their pairs have no place
+    integer :: points_left_out = 0
     !> contacts whose intact bond is stretched
     integer :: stretched_bonds = 0
     !> identifiers (n_columns)

@@ -33,8 +33,8 @@ module gravier_narrow_phase
     type(spring_t), allocatable :: spring(:)
     !> where bodies have shapes (n)
     type(contact_place_t), allocatable :: place(:)
-    !> pairs of pieces whose cores overlap: more than their roundings
-    integer :: overlapping_cores = 0
+    !> pairs of pieces whose cores overlap: more than their roundings; points that pairs have no place for
+    integer :: overlapping_cores = 0, points_left_out = 0
     !> contacts whose intact bond is stretched, see `is_stretched`
     integer :: stretched_bonds = 0
   end type contact_list_t
@@ -61,6 +61,7 @@ contains
     allocate (found%place(merge(room, 0, decomposition%no > 0)))
     found%n = 0
     found%overlapping_cores = 0
+    found%points_left_out = 0
     found%stretched_bonds = 0
     if (decomposition%no > 0) then
       call find_contacts_of_shapes(view, decomposition, physics, found)
@@ -135,6 +136,7 @@ contains
       call add_contact(view, decomposition, physics, found)
     end do
     found%overlapping_cores = found%overlapping_cores + points%overlapping_cores
+    found%points_left_out = found%points_left_out + points%left_out
   end subroutine find_facet_contacts
 
   !> The contacts of bodies with shapes: a pair has as many places in the list as it may have points.
@@ -161,6 +163,7 @@ contains
       w = w + view%list%points_of(p)
     end do
     found%overlapping_cores = points%overlapping_cores
+    found%points_left_out = points%left_out
   end subroutine find_contacts_of_shapes
 
   !> Write point `k` of pair `p` behind the last contact of the list.

@@ -27,8 +27,8 @@ module gravier_pair_points
     real(dp), allocatable :: gap(:)
     !> of the features of the two pieces, and of the pieces (2, n), both above 0
     integer, allocatable :: key(:, :)
-    !> pairs of pieces whose cores overlap, over all pairs asked for
-    integer :: overlapping_cores = 0
+    !> pairs of pieces whose cores overlap, and points that a pair has no place for, over all pairs asked for
+    integer :: overlapping_cores = 0, left_out = 0
     contains
     procedure :: add => pair_points_add
     procedure :: merge_near => pair_points_merge_near
@@ -187,6 +187,7 @@ contains
     integer :: k, l, shallowest
 
     if (points%n <= most) return
+    points%left_out = points%left_out + points%n - most
     dropped(:) = .false.
     do k = 1, points%n - most
       shallowest = 0

@@ -93,6 +93,7 @@ contains
       end do
       sub%n_contacts = found%n
       sub%overlapping_cores = found%overlapping_cores
+      sub%points_left_out = found%points_left_out
       sub%stretched_bonds = found%stretched_bonds
       sub%n_bodies = sub%n_grains
       do b = 1, size(boundaries)

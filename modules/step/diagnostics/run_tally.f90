@@ -48,6 +48,8 @@ module gravier_run_tally
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> steps in which cores of bodies with shapes overlapped, and the most pairs of pieces in one
     integer(i8) :: steps_with_cores = 0, most_cores = 0
+    !> steps in which bodies touched in more points than are kept, and the most points left out in one
+    integer(i8) :: steps_left_out = 0, most_left_out = 0
     !> steps in which intact bonds were stretched, and the most of them in one
     integer(i8) :: steps_stretched = 0, most_stretched = 0
     !> of the solve that stagnated with most contacts that creep, and the largest change over the velocity scale of all such solves
@@ -131,7 +133,7 @@ contains
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
-    !> with the pairs of pieces whose cores overlap, and the bonds that are stretched
+    !> with the pairs of pieces whose cores overlap, the points left out, and the bonds that are stretched
     type(interface_statistics_t), intent(in) :: statistics
     !> a projection has shifted grains by more than rounding
     logical, intent(in) :: mended
@@ -147,6 +149,8 @@ contains
     if (mended) self%projected = self%projected + 1
     if (statistics%overlapping_cores > 0) self%steps_with_cores = self%steps_with_cores + 1
     self%most_cores = max(self%most_cores, statistics%overlapping_cores)
+    if (statistics%points_left_out > 0) self%steps_left_out = self%steps_left_out + 1
+    self%most_left_out = max(self%most_left_out, statistics%points_left_out)
     if (statistics%stretched_bonds > 0) self%steps_stretched = self%steps_stretched + 1
     self%most_stretched = max(self%most_stretched, statistics%stretched_bonds)
     self%shift = self%shift + shift
