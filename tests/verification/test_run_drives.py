@@ -78,6 +78,27 @@ class Moves(SmallScene):
         # it swings about the lowest point
         self.assertLess(np.abs(slow.position[:, 0, 0]).max(), 0.5 * ring)
 
+    def test_turntable(self):
+        """On a table that turns, what sticks stays on its circle, and a ball that rolls goes round at 2/7 of the speed: of second order, and
+        no friction is dissipated. With the velocity of the table at the place of contact the radius grew by pi w h in each turn."""
+        rate, radius = 2.0 * np.pi, 0.2
+        table = [plane([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], rotation=[0.0, 0.0, rate], friction=1.0)]
+        for rolls, speed, bound in ((False, rate * radius, 1.0), (True, 2.0 / 7.0 * rate * radius, 2.0 / 7.0)):
+            for theta in (0.5, 0.8):
+                away = {}
+                for steps in (256, 512):
+                    ball = Grain([radius, 0.0, RADIUS], [0.0, speed, 0.0], [5.0 / 7.0 * rate * radius / RADIUS * rolls, 0.0, 0.0], radius=RADIUS)
+                    record = self.play(f"turntable {rolls} {theta} {steps}", [ball], table, (0, 0, -G), steps, scene={"rotation": rolls},
+                                       time={"step": 1.0 / steps, "theta": theta}, output={"energy": True, "every": steps})
+                    turned = rate * bound
+                    place = radius * np.array([np.cos(turned), np.sin(turned)])
+                    away[steps] = np.linalg.norm(record.position[-1, 0, :2] - place)
+                    friction = record.run.history()["dissipated_friction"]
+                    self.assertLess(np.abs(friction).max(), 1e-3 * 0.5 * MASS * speed**2)
+                case = f"{'ball that rolls' if rolls else 'block that sticks'} on a turntable, theta = {theta}"
+                self.verify(case, "distance from where it should be after a turn of the table [m]", away[512], 0.0, 1.5e-4)
+                self.assertGreater(np.log2(away[256] / away[512]), 1.8, case)
+
     def test_glued(self):
         """Glued grains turn about a pivot for 10^4 steps: distances stay and places are those of the turn."""
         def check(dimension):

@@ -9,7 +9,7 @@ module gravier_contact_packing
   use gravier_contact_problem, only: subproblem_t
   use gravier_cell_response, only: image_velocity
   use gravier_halo, only: local_bodies_t
-  use gravier_surface_velocity, only: contact_place_t
+  use gravier_surface_velocity, only: contact_place_t, add_travel
   use gravier_pair_laws, only: law_of, terms_of
   use gravier_contact_springs, only: pack_spring
   use gravier_bond_turning, only: find_bond_velocity
@@ -80,7 +80,7 @@ contains
       sub%pair(:, c) = pair(:, this%f)
       call take_terms(view, found, boundaries, physics%laws, before, this)
       if (this%b > 0) then
-        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), kernels, this, sub, start)
+        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), physics, this, sub, start)
       end if
       if (physics%cell%moves) call pack_image(view, this, sub)
       call pack_terms(view, found, kernels, physics%h, this, sub)
@@ -187,29 +187,40 @@ contains
     end do
   end subroutine find_pairs
 
-  !> The point of a turning boundary that a contact touches, as a body of its own.
-  subroutine add_column(view, found, boundary, kernels, this, sub, start)
+  !> The point of a turning boundary that a contact touches, as a body of its own. Bonds hold its bodies on their circles by
+  !> themselves.
+  subroutine add_column(view, found, boundary, physics, this, sub, start)
     type(local_bodies_t), intent(in) :: view
     type(contact_list_t), intent(in) :: found
     type(boundary_t), intent(in) :: boundary
-    type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
     real(dp), intent(inout), contiguous :: start(:, :)
-    real(dp) :: points(kernels%nd, 2)
-    integer :: nd, side
+    real(dp) :: points(size(found%normal, 1), 2)
+    integer :: nd, side, first
 
-    nd = kernels%nd
+    nd = size(points, 1)
+    first = merge(3, 1, nd == 2)
     side = merge(1, 2, view%bodies%glued(this%i) > 0)
     sub%n_columns = sub%n_columns + 1
     sub%id(sub%n_columns) = boundary%id
     sub%boundary(sub%n_columns) = this%b
     call find_touching_points(view, found, this, points)
-    call boundary%velocity_at(points(:, side), sub%v_free(1:nd, sub%n_columns))
-    if (size(start, 2) > 0) call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
-    ! levers of boundaries are 0: rolling alone sees the spin
-    sub%v_free(nd + 1:, sub%n_columns) = boundary%spin(merge(3, 1, nd == 2):merge(2, 0, nd == 2) + kernels%nv - nd)
     sub%pair(side, this%c) = sub%n_columns
+    associate (v => sub%v_free(:, sub%n_columns))
+      call boundary%velocity_at(points(:, side), v(1:nd))
+      ! levers of boundaries are 0: rolling alone sees the spin
+      v(nd + 1:) = boundary%spin(first:first - 1 + size(v) - nd)
+    end associate
+    if (size(start, 2) > 0) call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
+    if (this%terms%joins) return
+    ! half of the way to the contact of the next step, and back to that of the last one
+    associate (body => view%bodies%velocity(1:nd, merge(this%j, this%i, side == 1)), normal => found%normal(:, this%f))
+      call add_travel(body, boundary%velocity(1:nd), boundary%spin, normal, 0.5_dp*physics%h, sub%v_free(1:nd, sub%n_columns))
+      if (size(start, 2) > 0) call add_travel(body, boundary%last_velocity(1:nd), boundary%last_spin, normal, &
+        & -0.5_dp*physics%h, start(1:nd, sub%n_columns))
+    end associate
   end subroutine add_column
 
   !> The points of the candidate and of the antagonist that touch (nd, 2) [m].

@@ -4,12 +4,13 @@
 module gravier_surface_velocity
   use gravier_kinds, only: dp
   use gravier_periodic, only: shift_of_code
+  use gravier_rotation, only: cross
   use gravier_boundary, only: boundary_t
   use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
-    & add_image_velocity, boundary_that_has
+    & add_image_velocity, boundary_that_has, add_travel
 
   !> Where two bodies touch.
   type :: contact_place_t
@@ -67,6 +68,29 @@ contains
       call boundaries(b)%last_velocity_at(point, v(1:size(point)))
     end if
   end subroutine find_start_velocity
+
+  !> Add to the velocity of a turning boundary at a contact what it changes by while the contact travels: with the boundary along
+  !> the normal, with the body across it. A body goes on from one place of contact to that of the next step with the velocity of
+  !> the end of a step: with that of the boundary at the first place, what sticks to a turntable would leave its circle by pi w h
+  !> of the radius in each turn. The normal is that of the contact, and the velocity along it stays.
+  pure subroutine add_travel(body, pivot, spin, normal, time, velocity)
+    !> velocities of the body and of the pivot of the boundary (nd) [m/s]; spin of the boundary [rad/s]
+    real(dp), intent(in) :: body(:), pivot(:), spin(3)
+    !> of the contact (nd)
+    real(dp), intent(in) :: normal(:)
+    !> for which the contact travels [s]
+    real(dp), intent(in) :: time
+    !> (nd) [m/s]
+    real(dp), intent(inout) :: velocity(:)
+    real(dp) :: way(3), change(3)
+    integer :: nd
+
+    nd = size(velocity)
+    way(:) = 0.0_dp
+    way(1:nd) = time*(body - pivot + sum((velocity - body)*normal)*normal)
+    change(:) = cross(spin, way)
+    velocity(:) = velocity + change(1:nd) - sum(change(1:nd)*normal)*normal
+  end subroutine add_travel
 
   !> The boundary that body `k` is, or is glued to; 0 of a free grain.
   pure integer function boundary_that_has(view, k) result(b)

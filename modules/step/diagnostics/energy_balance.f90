@@ -318,7 +318,7 @@ contains
     !> A column that stands for grain `k` of the view, or for a boundary.
     subroutine fill(column, k)
       integer, intent(in) :: column, k
-      real(dp) :: point(nd)
+      real(dp) :: point(nd), now(nd)
 
       associate (bodies => step%halo%view(s)%bodies, sub => step%problem%sub(s))
         if (column <= sub%n_grains) then
@@ -328,6 +328,11 @@ contains
         end if
         call find_touched_point(step, s, c, k, point)
         call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
+        ! what the end of the step has of the travel of the body (add_travel), its start lacks
+        if (earlier(sub%boundary(column))%turns()) then
+          call step%decomposition%boundaries(sub%boundary(column))%velocity_at(point, now)
+          start(1:nd, column) = start(1:nd, column) - (sub%v_global(1:nd, column) - now)
+        end if
         start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
       end associate
     end subroutine fill
