@@ -48,7 +48,8 @@ contains
     call expect(report, grains%radius_mean >= grains%radius_min .and. grains%radius_mean <= grains%radius_max, &
                 group, "radius_mean", error, "a radius from radius_min to radius_max, here " &
                 //shown_text(report, group, "radius_min")//" and "//shown_text(report, group, "radius_max"))
-    call expect(report, grains%radius_deviation > 0.0_dp, group, "radius_deviation", error)
+    call expect(report, grains%radius_deviation > 0.0_dp .and. grains%radius_deviation <= 1.0e3_dp, group, "radius_deviation", &
+                error)
   end subroutine check_radii
 
   !> Names of shapes need a file of shapes, and shares names.

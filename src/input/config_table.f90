@@ -96,7 +96,8 @@ module gravier_config_table
            "pivoting friction coefficient between bodies and boundaries; 0 in 2D", note="the value of `pivoting_friction`"), &
      key_t("scene", "wall_material", kind_text, "''", "", &
            "name of the `&material` of the boundaries; without one no `&law` is theirs"), &
-     key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; `.false.`: they never turn"), &
+     key_t("scene", "rotation", kind_logical, ".true.", "", "grains turn where friction asks; "// &
+           "`.false.`: they never turn, and spins of a bodies file are left out"), &
      key_t("scene", "period", kind_real, "3*0", ">= 0", &
            "length after which the scene repeats itself along each axis, 0: it does not; the third is 0 in 2D", &
            count=3, unit="m"), &

@@ -51,7 +51,7 @@ module gravier_config_table_grains
      key_t("", "radius_mean", kind_real, "0", "> 0", &
            "radius whose logarithm is the mean of the logarithms, from `radius_min` to `radius_max`", &
            unit="m", note="required", chooser="radii", chosen="log_normal"), &
-     key_t("", "radius_deviation", kind_real, "0", "> 0", "standard deviation of ln(radius/`radius_mean`)", &
+     key_t("", "radius_deviation", kind_real, "0", "> 0, at most 1000", "standard deviation of ln(radius/`radius_mean`)", &
            note="required", chooser="radii", chosen="log_normal"), &
      key_t("", "radius_table", kind_text, "''", "not empty", "path of a CSV file with columns `radius,share`", &
            note="required", chooser="radii", chosen="table"), &

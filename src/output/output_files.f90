@@ -6,6 +6,7 @@ module gravier_output_files
   use gravier_file_system, only: place_of, place_t, check_directory, is_directory
   use gravier_hdf5_file, only: check_length
   use gravier_own_files, only: part_of
+  use gravier_table_place, only: may_replace
   use gravier_config_types, only: config_t
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
@@ -17,8 +18,9 @@ module gravier_output_files
 
 contains
 
-  !> Refuse an output directory that cannot be written to, an output whose place a directory has, and an input that the run would
-  !> replace by an output. Rank 0 looks and writes nothing. Failure: status_input, with the key. Collective.
+  !> Refuse an output directory that cannot be written to, an output whose place a directory or a file of another kind has, and an
+  !> input that the run would replace by an output. Rank 0 looks and writes nothing. Failure: status_input, with the key.
+  !> Collective.
   subroutine check_paths(comm, config, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -81,7 +83,7 @@ contains
       & "': expected a directory that can be written to: "//reason%message)
   end subroutine refuse_directory
 
-  !> Refuse outputs whose place a directory has. Not collective.
+  !> Refuse outputs whose place a directory has, or a file of another kind. Not collective.
   subroutine check_outputs(config, names, error)
     type(config_t), intent(in) :: config
     !> of the files, with commas between
@@ -100,6 +102,10 @@ contains
       if (is_directory(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
         & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//name// &
         & ", as a file of this run; expected another name for one of them")
+      if (allocated(error)) exit
+      if (.not. may_replace(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
+        & ": &output directory = '"//trim(config%output%directory)//"': the file "//name//" in it is none of this program, "// &
+        & "and is not replaced; expected another directory, or another name for that file")
     end do
   end subroutine check_outputs
 

@@ -7,7 +7,7 @@ import sys
 import unittest
 
 import h5py
-from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, write
+from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, merged, run_case, write
 
 import gravier
 from gravier import blocks
@@ -93,6 +93,28 @@ class OwnFiles(RunTestCase):
                     done = self.tool(tool, name)
                     self.assertEqual((done.returncode, done.stderr), (0, ""))
                     self.assertGreater(os.path.getsize(os.path.join(self.work, name if tool != "blocks" else "wall.nml")), 0)
+
+    def test_files_of_a_run(self):
+        """A run replaces files of an older one and empty ones, and refuses a directory with a file of another origin under one of its names."""
+        case = merged(CASE, {"output": {"final_bodies": True, "vtk": True}})
+        run_case(case, directory=self.work)
+        names = ["run.log", "history.csv", "trace.csv", "results.h5", "final_bodies.h5", "bodies.vtkhdf"]
+        for name in names:
+            path = os.path.join(self.work, "results", name)
+            with open(path, "rb") as file:
+                own = file.read()
+            write(path, "")
+            self.assert_status(run_case(case, directory=self.work), 0)
+            write(path, "time,mine\n1,2\n")
+            before = self.files()
+            run = run_case(case, directory=self.work)
+            self.assert_status(run, 2)
+            self.assertIn(f"case.nml: &output directory = 'results': the file {name} in it is none of this program, and is not replaced; expected "
+                          "another directory, or another name for that file", str(run))
+            self.assertEqual(self.files(), before)
+            with open(path, "wb") as file:
+                file.write(own)
+        self.assert_status(run_case(case, directory=self.work), 0)
 
     def test_functions_of_the_package(self):
         """The same by exceptions: bodies files, cases, seals of tables and blocks."""

@@ -239,8 +239,17 @@ class Shapes(RunTestCase):
             file["bodies/orientation"].attrs["axes"] = "written"
             file["bodies/orientation"].attrs.pop("checksum", None)
             file["bodies/orientation"][1] = [0.5, 0.5, 0.5, 0.5]
-        again = run_case(merged(SOLID_CASE, {"scene": {"bodies_file": "bodies.h5"}}), 1, self.here("solids back 1"))
+        by_hand = merged(SOLID_CASE, {"scene": {"bodies_file": "bodies.h5"}})
+        again = run_case(by_hand, 1, self.here("solids back 1"))
         self.assert_status(again, 0)
+        for radius, text in ((-3.0, "-3.00000000E+00"), (float("nan"), "NaN")):
+            with h5py.File(self.here("solids back 1", "bodies.h5"), "r+") as file:
+                file.pop("bodies/scale", None)
+                file["bodies/radius"][0] = radius
+                file["bodies/radius"].attrs.pop("checksum", None)
+                number = file["bodies/id"][0]
+            self.assert_refused(run_case(by_hand, 1, self.here("solids back 1")),
+                                (f"bodies.h5: /bodies/radius: id {number}: {text}, but 0 or a number above 0 was expected",))
         np.testing.assert_allclose(package.Run(again.path("results")).bodies().orientation[1], bodies.orientation[1], atol=1e-15)
 
     def test_pictures(self):

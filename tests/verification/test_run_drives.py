@@ -243,6 +243,10 @@ class Forces(SmallScene):
             area = 2.0 if dimension == 2 else 3.0
             self.verify(f"plane under pressure, {dimension}D", "velocity [m/s]", record.boundary["velocity"][:, 2, :dimension],
                         -pressure * area / mass * record.time[:, None] * up, 1e-12)
+            # one that leans is longer, and its normal turns as much of the force aside
+            lids[0]["normal"] = floats(-up + 0.1 * e[0])
+            leans = self.play(f"pressure on a plane that leans {dimension}", [Grain(e.sum(axis=0), radius=RADIUS)], planes + lids, steps=20, **period)
+            self.verify(f"plane under pressure that leans, {dimension}D", "velocity [m/s]", leans.boundary["velocity"], record.boundary["velocity"], 1e-12)
         self.both(check)
 
     def test_pressure_between_planes_that_turn(self):

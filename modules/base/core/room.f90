@@ -123,8 +123,12 @@ contains
     do while (bytes >= 0.9995_dp*1000.0_dp**(k + 1) .and. k < size(units))
       k = k + 1
     end do
-    write (buffer, "(f12.1)") bytes/1000.0_dp**k
-    text = trim(adjustl(buffer))//" "//units(k)
+    if (bytes < 9999.5_dp*1000.0_dp**k) then
+      write (buffer, "(f12.1)") bytes/1000.0_dp**k
+      text = trim(adjustl(buffer))//" "//units(k)
+    else
+      text = to_text(bytes/1000.0_dp**k, 2)//" "//units(k)
+    end if
   end function bytes_text
 
 end module gravier_room

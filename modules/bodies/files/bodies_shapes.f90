@@ -62,7 +62,7 @@ contains
     character(len=:), allocatable :: names
     integer :: n, k, at, length
 
-    allocate (number(shapes%n), source=0)
+    allocate (number(0))
     if (.not. file%has_attribute("/bodies/shape", "names")) then
       call raise(error, status_input, path//": /bodies/shape: no attribute names; the names of the shapes with commas between "// &
         & "were expected in it")
@@ -70,9 +70,14 @@ contains
     end if
     call file%read_attribute("/bodies/shape", "names", names, error)
     if (allocated(error)) return
-    at = 1
     n = 0
-    do while (at <= len_trim(names) .and. n < size(number))
+    do k = 1, len_trim(names)
+      if (names(k:k) == "," .or. k == len_trim(names)) n = n + 1
+    end do
+    deallocate (number)
+    allocate (number(n), source=0)
+    at = 1
+    do n = 1, size(number)
       length = index(names(at:)//",", ",") - 1
       k = find_shape(shapes, trim(adjustl(names(at:at + length - 1))))
       if (k == 0) then
@@ -80,7 +85,6 @@ contains
           & ": expected one of the shapes of the scene, "//shape_names(shapes, ", "))
         return
       end if
-      n = n + 1
       number(n) = k
       at = at + length + 1
     end do
@@ -99,9 +103,9 @@ contains
     if (allocated(error)) return
     do i = 1, bodies%n
       if (listed(i) == 0) cycle
-      if (listed(i) < 0 .or. listed(i) > count(number > 0)) then
+      if (listed(i) < 0 .or. listed(i) > size(number)) then
         call raise(error, status_input, path//": /bodies/shape: id "//to_text(bodies%id(i))//": "//to_text(listed(i))// &
-          & ", but a number from 0 to "//to_text(count(number > 0))//", that of the last of its names, was expected")
+          & ", but a number from 0 to "//to_text(size(number))//", that of the last of its names, was expected")
         return
       end if
       bodies%shape(i) = number(narrow(listed(i)))
@@ -196,6 +200,11 @@ contains
     do i = 1, bodies%n
       if (bodies%shape(i) == 0) cycle
       associate (size_of => shapes%shape(bodies%shape(i))%size)
+        if (.not. bodies%radius(i) >= 0.0_dp) then
+          call raise(error, status_input, path//": /bodies/radius: id "//to_text(bodies%id(i))//": "//to_text(bodies%radius(i))// &
+            & ", but 0 or a number above 0 was expected")
+          return
+        end if
         call settle_radius(size_of, scale(i), scaled, bodies%radius(i), agrees)
         if (agrees) cycle
         call raise(error, status_input, path//": /bodies/radius: id "//to_text(bodies%id(i))//": "//to_text(bodies%radius(i))// &

@@ -52,7 +52,7 @@ contains
     if (dimension == 2) then
       call cut_lines(point, first, corner, facet)
     else
-      call cut_faces(point, first, corner, facet)
+      call cut_faces(path, point, first, corner, facet, error)
     end if
   end subroutine read_mesh
 
@@ -142,13 +142,16 @@ contains
   end subroutine cut_lines
 
   !> The triangles of faces.
-  pure subroutine cut_faces(point, first, corner, facet)
+  subroutine cut_faces(path, point, first, corner, facet, error)
+    character(len=*), intent(in) :: path
     real(dp), intent(in) :: point(:, :)
     integer, intent(in) :: first(:), corner(:)
     real(dp), allocatable, intent(out) :: facet(:, :, :)
+    type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: face(:, :)
     integer, allocatable :: triangle(:, :)
     integer :: f, c, k, n
+    logical :: is_simple
 
     allocate (facet(3, 3, size(corner) - 2*(size(first) - 1)))
     n = 0
@@ -157,7 +160,11 @@ contains
       do c = 1, size(face, 2)
         face(:, c) = point(:, corner(first(f) + c - 1))
       end do
-      call clip_ears(face, triangle)
+      call clip_ears(face, triangle, is_simple)
+      if (.not. is_simple) then
+        call raise(error, status_input, path//": face "//to_text(f)//": a polygon that crosses itself: expected one that does not")
+        return
+      end if
       do k = 1, size(triangle, 2)
         n = n + 1
         do c = 1, 3

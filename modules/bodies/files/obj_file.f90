@@ -1,5 +1,5 @@
 !> Surfaces of polygons as OBJ files hold them: lines "v x y z" and "f i j k ..."; and lines through points, "l i j k ...".
-!> Textures, normals, names and groups are passed over.
+!> Textures, normals, names, groups and comments are passed over.
 module gravier_obj_file
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
@@ -77,7 +77,7 @@ contains
         counts(1) = counts(1) + 1
       else if (word == letter) then
         counts(2) = counts(2) + 1
-        do while (len(lines%word()) > 0)
+        do while (.not. ends(lines%word()))
           counts(3) = counts(3) + 1
         end do
       end if
@@ -112,7 +112,7 @@ contains
         n_faces = n_faces + 1
         do
           word = lines%word()
-          if (len(word) == 0) exit
+          if (ends(word)) exit
           n_corners = n_corners + 1
           call read_corner(word, n, corner(n_corners))
           if (corner(n_corners) == 0) call refuse(""""//word//""", but the number of a point was expected, from 1 to "//to_text(n))
@@ -132,6 +132,14 @@ contains
     end subroutine refuse
 
   end subroutine read_lines
+
+  !> Whether a line has no more words, or a comment from here on.
+  pure logical function ends(word)
+    character(len=*), intent(in) :: word
+
+    ends = len(word) == 0
+    if (.not. ends) ends = word(1:1) == "#"
+  end function ends
 
   !> The point that "7", "7/1", "7/1/2" or "7//2" names; a number below 0 counts from the last point on. 0 where there is none.
   pure subroutine read_corner(word, n, point)

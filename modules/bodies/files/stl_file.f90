@@ -37,8 +37,9 @@ contains
       allocate (points(3, 3*n))
       call read_binary(path, lines%text, points, error)
     else if (lower(lines%text(1:min(5, len(lines%text)))) == "solid" .and. index(lines%text, achar(0)) == 0) then
-      n = count_vertices(lines%text)/3
-      allocate (points(3, 3*n))
+      n = count_vertices(lines%text)
+      allocate (points(3, n))
+      n = n/3
       call read_ascii(path, lines, points, error)
     else
       call raise(error, status_input, path//": no STL file: it is no text that begins with ""solid"", and its length of "// &
@@ -161,7 +162,7 @@ contains
         in_facet = in_facet + 1
         n = n + 1
         if (.not. open_facet) call refuse("a corner outside of a facet")
-        if (n > size(points, 2)) call refuse("a corner outside of facets of three")
+        if (in_facet > 3) call refuse("a fourth corner of a facet, but 3 were expected")
         if (allocated(error)) return
         do d = 1, 3
           word = lines%word()

@@ -141,9 +141,13 @@ contains
     do d = 1, self%box%nd
       first(d) = brick_at(self, d, position(d) - reach*slack)
       last(d) = brick_at(self, d, position(d) + reach*slack)
-      if (.not. self%box%periodic(d) .or. last(d) - first(d) >= self%n(d)) then
+      if (.not. self%box%periodic(d)) then
         first(d) = max(first(d), 0)
         last(d) = min(last(d), self%n(d) - 1)
+      else if (last(d) - first(d) >= self%n(d)) then
+        ! around the period: all of them, each once
+        first(d) = 0
+        last(d) = self%n(d) - 1
       end if
     end do
     do k = first(3), last(3)

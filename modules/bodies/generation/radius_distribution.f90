@@ -16,6 +16,8 @@ module gravier_radius_distribution
   integer, parameter :: stream_of_radii = 0
   !> a log-normal distribution is integrated over so many standard deviations on either side: 1e-19 is left out
   real(dp), parameter :: tail = 9.0_dp
+  !> standard deviation of ln(r) at and below which all radii are the mean
+  real(dp), parameter :: least_deviation = 1.0e-12_dp
 
   !> A distribution by number. The caller sets the components that its kind asks for, or reads the table.
   type :: radius_distribution_t
@@ -185,7 +187,7 @@ contains
     integer :: k
 
     radius = self%radius_mean
-    if (self%radius_deviation <= 0.0_dp) return
+    if (self%radius_deviation <= least_deviation) return
     low = max(-tail, log(self%radius_min/self%radius_mean)/self%radius_deviation)
     high = min(tail, log(self%radius_max/self%radius_mean)/self%radius_deviation)
     share = (1.0_dp - u)*normal_share(low) + u*normal_share(high)
@@ -286,7 +288,8 @@ contains
       density = (r/self%radius_min)**(1 - self%nd)
     case default
       density = 1.0_dp
-      if (self%radius_deviation > 0.0_dp) density = exp(-0.5_dp*(log(r/self%radius_mean)/self%radius_deviation)**2)
+      ! below that ln(r/radius_mean) is rounding
+      if (self%radius_deviation > least_deviation) density = exp(-0.5_dp*(log(r/self%radius_mean)/self%radius_deviation)**2)
     end select
   end function density
 

@@ -103,7 +103,8 @@ contains
     end do
   end function mass_of_capsule
 
-  !> Those of several bodies together that do not overlap (the theorem of Huygens and Steiner).
+  !> Those of several bodies together that do not overlap (the theorem of Huygens and Steiner). The centre is found from that of the
+  !> first one, so that bodies far from the origin keep their digits.
   pure function mass_of_sum(masses) result(mass)
     type(mass_t), intent(in) :: masses(:)
     type(mass_t) :: mass
@@ -112,10 +113,10 @@ contains
 
     do k = 1, size(masses)
       mass%volume = mass%volume + masses(k)%volume
-      mass%centre(:) = mass%centre + masses(k)%volume*masses(k)%centre
+      mass%centre(:) = mass%centre + masses(k)%volume*(masses(k)%centre - masses(1)%centre)
     end do
     if (.not. mass%volume > 0.0_dp) return
-    mass%centre(:) = mass%centre/mass%volume
+    mass%centre(:) = masses(1)%centre + mass%centre/mass%volume
     do k = 1, size(masses)
       way(:) = masses(k)%centre - mass%centre
       mass%inertia(:, :) = mass%inertia + masses(k)%inertia

@@ -96,9 +96,10 @@ contains
     area = sum(made%area)
     centre(:) = 0.0_dp
     do k = 1, size(made)
-      centre(:) = centre + made(k)%area*made(k)%centroid
+      ! from the first piece, so that pieces far from the origin keep their digits
+      centre(:) = centre + made(k)%area*(made(k)%centroid - made(1)%centroid)
     end do
-    centre(:) = centre/area
+    centre(:) = made(1)%centroid + centre/area
     moment = 0.0_dp
     size_of = 0.0_dp
     allocate (shape%piece(size(made)))

@@ -1,10 +1,10 @@
-!> Where a program may write a file whose name the user gives: where there is none, an empty one, or one that it has made.
+!> Where a program may write a file: where there is none, an empty one, or one that it has made.
 module gravier_table_place
   use gravier_errors, only: error_t, raise, status_input
   use gravier_file_system, only: file_length, is_directory
   implicit none
   private
-  public :: check_table_place, check_hdf5_place, begins_with
+  public :: check_table_place, check_hdf5_place, may_replace, begins_with
 
   !> first bytes of an HDF5 file
   character(len=*), parameter :: hdf5_mark = char(137)//"HDF"//achar(13)//achar(10)//achar(26)//achar(10)
@@ -36,6 +36,26 @@ contains
 
     call check_origin(path, hdf5_mark, "an HDF5 file", error)
   end subroutine check_hdf5_place
+
+  !> Whether a run may replace what has the name of one of its files: nothing, what is empty, and what begins as such a file does,
+  !> by the ending of the name. Not collective.
+  logical function may_replace(path)
+    character(len=*), intent(in) :: path
+    logical :: exists
+
+    inquire (file=path, exist=exists)
+    may_replace = .true.
+    if (.not. exists) return
+    if (file_length(path) == 0) return
+    select case (path(index(path, ".", back=.true.):))
+    case (".csv")
+      may_replace = begins_with(path, "step,")
+    case (".log")
+      may_replace = begins_with(path, "Gravier ")
+    case default
+      may_replace = begins_with(path, hdf5_mark)
+    end select
+  end function may_replace
 
   !> Refuse to replace what does not begin as a file of the program does.
   subroutine check_origin(path, beginning, kind, error)

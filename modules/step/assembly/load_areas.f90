@@ -10,14 +10,15 @@ module gravier_load_areas
 
 contains
 
-  !> Area that a pressure on plane `b` works on [m^2, m in 2D]; 0 for another boundary.
+  !> Area that a pressure on plane `b` works on, that of the plane itself where it leans [m^2, m in 2D]; 0 for another boundary.
   pure real(dp) function facing_area(decomposition, b) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: b
 
     area = 0.0_dp
     associate (boundary => decomposition%boundaries(b))
-      if (boundary%is_plane()) area = area_across(decomposition, boundary%load_axis(), boundary%surface%point)
+      if (boundary%is_plane()) area = area_across(decomposition, boundary%load_axis(), boundary%surface%point)/ &
+        & abs(boundary%surface%axis(boundary%load_axis()))
     end associate
   end function facing_area
 
@@ -58,6 +59,8 @@ contains
     do b = 1, size(area)
       associate (boundary => decomposition%boundaries(b))
         if (.not. boundary%is_driven()) cycle
+        area(b) = facing_area(decomposition, b)
+        if (area(b) > 0.0_dp) cycle
         if (allocated(boundary%surface)) area(b) = boundary%surface%own_area()
         if (area(b) > 0.0_dp) cycle
         place(:) = boundary%pivot

@@ -49,6 +49,9 @@ module gravier_velocity_scale
   real(dp), parameter :: share_of_bonds = 0.2_dp
   !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
+  !> fraction of the grains in contact that have as much mass as all, were they as heavy as the mean by mass, below which masses are
+  !> uneven
+  real(dp), parameter :: even_share = 0.25_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
 
@@ -141,8 +144,9 @@ contains
     !> that the load on each boundary works on (boundaries) [m^2, m in 2D]
     real(dp), intent(in) :: area(:)
     type(imposed_motion_t) :: motion
-    !> squares and number of attractions, of impulses where nothing loads or drives, mass, twice the energy, momentum
-    real(dp) :: parts(6 + decomposition%nd, size(problem%sub)), sums(6 + decomposition%nd)
+    !> squares and number of attractions, of impulses where nothing loads or drives; number, masses and their squares of grains;
+    !> mass, twice the energy and momentum of all bodies
+    real(dp) :: parts(9 + decomposition%nd, size(problem%sub)), sums(9 + decomposition%nd)
     real(dp) :: attraction
     logical :: idle
     integer :: s
@@ -156,8 +160,9 @@ contains
     do s = 1, size(problem%sub)
       if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
       if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
-      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(5:, s))
-      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(5:, s))
+      call add_masses(problem%sub(s), parts(5:7, s))
+      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(8:, s))
+      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(8:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     if (decomposition%na > 0) self%load = max(self%load, applied_load(problem))
@@ -172,16 +177,16 @@ contains
     self%stress = 0.0_dp
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%own = 0.0_dp
-    if (sums(5) > 0.0_dp) then
+    if (sums(8) > 0.0_dp) then
       ! nothing holds a scene without boundaries: its mean motion is none
-      if (.not. motion%bounded) sums(6) = max(sums(6) - sum(sums(7:)**2)/sums(5), 0.0_dp)
-      self%own = sqrt(sums(6)/sums(5))
+      if (.not. motion%bounded) sums(9) = max(sums(9) - sum(sums(10:)**2)/sums(8), 0.0_dp)
+      self%own = sqrt(sums(9)/sums(8))
     end if
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call self%choose()
-    if (.not. motion%bounded .and. sums(5) > 0.0_dp) motion%common(1:decomposition%nd) = sums(7:)/sums(5)
-    call set_concerns(self, physics, motion%common, problem)
+    if (.not. motion%bounded .and. sums(8) > 0.0_dp) motion%common(1:decomposition%nd) = sums(10:)/sums(8)
+    call set_concerns(self, physics, motion%common, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
     if (self%drive > 0.0_dp) problem%drive_scale = max(self%drive, self%creep)
@@ -204,6 +209,21 @@ contains
     sums(1) = sum(sub%impulse(:, 1, :)**2)
     sums(2) = real(count(sub%impulse(:, 1, :) > 0.0_dp), dp)
   end subroutine add_impulses
+
+  !> Number, mass and squared masses of the grains. One that several subdomains share counts in equal parts.
+  pure subroutine add_masses(sub, sums)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: sums(3)
+    real(dp) :: m
+    integer :: b
+
+    do b = 1, sub%n_grains
+      m = 1.0_dp/sub%inverse_mass(1, b)
+      sums(1) = sums(1) + 1.0_dp/sub%multiplicity(b)
+      sums(2) = sums(2) + m/sub%multiplicity(b)
+      sums(3) = sums(3) + m**2/sub%multiplicity(b)
+    end do
+  end subroutine add_masses
 
   !> Mass, twice the energy and momentum of the grains at the start of the step. Loads of the step are taken out of the
   !> velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains share counts
@@ -269,31 +289,40 @@ contains
     if (allocated(sub%attraction_load)) v(:) = v - sub%inverse_mass(1, b)*sub%attraction_load(1:nd, b)
   end subroutine find_own_velocity
 
-  !> Where the motion of the bodies is what errors are compared with, slow ones among them are to be as exact as if they were alone:
-  !> their errors count as much more as their own velocity is smaller, and light ones as if they had the mass of the mean grain.
-  subroutine set_concerns(self, physics, frame, problem)
+  !> What errors of single bodies count for in the estimate. Where the motion of the bodies is what errors are compared with, slow
+  !> ones among them are to be as exact as if they were alone: their errors count as much more as their own velocity is smaller, and
+  !> light ones as if they had the mass of the mean grain. Where few heavy bodies have most of the mass of those in contact, all
+  !> light ones count as if they had the mean mass of these.
+  subroutine set_concerns(self, physics, frame, masses, problem)
     class(velocity_scale_t), intent(in) :: self
     type(physics_t), intent(in) :: physics
     !> velocity of the observer [m/s]
     real(dp), intent(in) :: frame(3)
+    !> number, mass and squared masses of the grains in contact
+    real(dp), intent(in) :: masses(3)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: v(problem%kernels%nd), own, limit, least
+    real(dp) :: v(problem%kernels%nd), own, limit, least, mean
+    logical :: moves, is_uneven
     integer :: s, b
 
+    moves = self%kind == of_motion .or. self%kind == of_bonds
+    is_uneven = masses(2)**2 < even_share*masses(1)*masses(3)
+    mean = masses(2)/max(masses(1), 1.0_dp)
     limit = slow_part*self%value
     least = merge(self%quiet, least_own*self%value, self%quiet > 0.0_dp)
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         if (allocated(sub%concern)) deallocate (sub%concern)
-        if (self%kind /= of_motion .and. self%kind /= of_bonds) cycle
+        if (.not. (moves .or. is_uneven)) cycle
+        allocate (sub%concern(sub%n_bodies), source=1.0_dp)
         do b = 1, sub%n_grains
+          if (is_uneven) sub%concern(b) = max(1.0_dp, mean*sub%inverse_mass(1, b))
+          if (.not. moves) cycle
           call find_own_velocity(sub, physics, b, v)
           own = norm2(v - frame(1:size(v)))
           if (problem%kernels%row%arm_i > 0) own = hypot(own, sqrt(square_of_spin(sub, b, size(v))))
           own = max(least, self%share*own)
-          if (own >= limit) cycle
-          if (.not. allocated(sub%concern)) allocate (sub%concern(sub%n_bodies), source=1.0_dp)
-          sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
+          if (own < limit) sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
         end do
       end associate
     end do

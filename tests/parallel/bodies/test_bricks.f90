@@ -19,8 +19,10 @@ program test_bricks
   call comm%init()
   do nd = 2, 3
     do k = 1, size(counts)
-      call test_box(nd, counts(k), .false.)
-      call test_box(nd, counts(k), .true.)
+      call test_box(nd, counts(k), .false., 0.2_dp)
+      call test_box(nd, counts(k), .true., 0.2_dp)
+      ! around the whole period
+      call test_box(nd, counts(k), .true., 0.95_dp)
     end do
   end do
   call test_cuts()
@@ -55,11 +57,11 @@ contains
     end do
   end subroutine draw_point
 
-  subroutine test_box(nd, n_bricks, periodic)
+  subroutine test_box(nd, n_bricks, periodic, reach)
     integer, intent(in) :: nd, n_bricks
     logical, intent(in) :: periodic
+    real(dp), intent(in) :: reach
     integer, parameter :: n_points = 300
-    real(dp), parameter :: reach = 0.2_dp
     type(sample_box_t) :: box
     type(bricks_t) :: bricks
     type(outbox_t) :: outbox

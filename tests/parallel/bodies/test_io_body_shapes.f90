@@ -368,6 +368,11 @@ contains
     call refuse_hdf5(1_i8, 1.0_dp, 0.0_dp, "brick,ball", &
       & "/bodies/shape: attribute names: ball: expected one of the shapes of the "// &
       & "scene, brick, Coin")
+    call refuse_hdf5(1_i8, 1.0_dp, 0.0_dp, "brick,Coin,brick,ball", &
+      & "/bodies/shape: attribute names: ball: expected one of the shapes of the "// &
+      & "scene, brick, Coin")
+    call refuse_hdf5(4_i8, 1.0_dp, 0.0_dp, "brick,Coin,brick", &
+      & "/bodies/shape: id 2: 4, but a number from 0 to 3, that of the last of its names")
     call refuse_hdf5(2_i8, 1.0_dp, 0.0_dp, "brick", &
       & "/bodies/shape: id 2: 2, but a number from 0 to 1, that of the last of its names")
     call refuse_hdf5(-1_i8, 1.0_dp, 0.0_dp, "brick", "/bodies/shape: id 2: -1, but a number from 0 to 1")

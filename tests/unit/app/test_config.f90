@@ -1260,7 +1260,7 @@ contains
     call refuse(sample("count = 1 box = 1 radii = 'log_normal' radius_min = 1 radius_max = 1 radius_deviation = 1"), &
       "&sample radius_mean is missing: " // positive // " (m), required by radii = 'log_normal'")
     call refuse(sample("count = 1 box = 1 radii = 'log_normal' radius_min = 1 radius_max = 1 radius_mean = 1"), &
-      "&sample radius_deviation is missing: " // positive // ", required by radii = 'log_normal'")
+      "&sample radius_deviation is missing: " // positive // ", at most 1000, required by radii = 'log_normal'")
     call refuse(sample("count = 1 box = 1 radii = 'table'"), "&sample radius_table is missing: expected a text in quotes, " &
       // "not empty, at most 4096 characters, required by radii = 'table'")
     call refuse(sample("count = 1 box = 1 radius = 1 preparation = 'compacted'"), &
@@ -1307,7 +1307,10 @@ contains
       "&sample radius_mean = 0: " // positive // " (m)")
     call refuse(sample(log_normal // "radius_mean = 0.5 radius_deviation = 1"), "&sample radius_mean = 0.5: " // between)
     call refuse(sample(log_normal // "radius_mean = 3 radius_deviation = 1"), "&sample radius_mean = 3: " // between)
-    call refuse(sample(log_normal // "radius_mean = 1 radius_deviation = 0"), "&sample radius_deviation = 0: " // positive)
+    call refuse(sample(log_normal // "radius_mean = 1 radius_deviation = 0"), &
+      "&sample radius_deviation = 0: " // positive // ", at most 1000")
+    call refuse(sample(log_normal // "radius_mean = 1 radius_deviation = 1e4"), "&sample radius_deviation = 1e4: " // positive &
+      // ", at most 1000")
     call refuse(sample(boxed // "radii = 'table' radius_table = ''"), &
       "&sample radius_table = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(sample(made // "solid_fraction = 0"), "&sample solid_fraction = 0: expected a finite real number in (0, 0.6)")

@@ -27,7 +27,8 @@ program test_room
   call check_equal(bytes_text(1.26e6_dp), "1.3 MB", "megabytes")
   call check_equal(bytes_text(999.96e6_dp), "1.0 GB", "nearly the next unit")
   call check_equal(bytes_text(5.5e11_dp), "550.0 GB", "gigabytes")
-  call check_equal(bytes_text(1.0e24_dp), "1000000.0 EB", "beyond all units")
+  call check_equal(bytes_text(1.0e24_dp), "1.0E+06 EB", "beyond all units")
+  call check_equal(bytes_text(1.0e22_dp), "1.0E+04 EB", "ten thousand of the largest unit")
   call finish_checks()
   call MPI_Finalize()
 

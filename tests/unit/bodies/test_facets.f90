@@ -328,25 +328,48 @@ contains
   subroutine test_ears()
     real(dp), parameter :: ell(3, 6) = reshape([0, 0, 1, 2, 0, 1, 2, 1, 1, 1, 1, 1, 1, 2, 1, 0, 2, 1]*1.0_dp, [3, 6])
     integer, allocatable :: triangle(:, :)
-    real(dp) :: area, whole, p(3, 6)
+    !> a square of 4 with a hole of 2, joined by a bridge; and a polygon that crosses itself
+    real(dp), parameter :: key(3, 10) = reshape([0, 0, 1, 4, 0, 1, 4, 4, 1, 0, 4, 1, 0, 0, 1, 1, 1, 1, 1, 3, 1, 3, 3, 1, 3, 1, 1, &
+      & 1, 1, 1]*1.0_dp, [3, 10])
+    real(dp), parameter :: bow(3, 4) = reshape([0, 0, 1, 1, 1, 1, 1, 0, 1, 0, 1, 1]*1.0_dp, [3, 4])
+    real(dp) :: area, whole, p(3, 6), q(3, 10)
+    logical :: is_simple
     integer :: k, start
 
+    do start = 0, 9
+      q(:, :) = cshift(key, start, dim=2)
+      call clip_ears(q, triangle, is_simple)
+      call check(is_simple, "triangles around a hole do not cover it")
+      whole = 0.0_dp
+      do k = 1, size(triangle, 2)
+        whole = whole + abs(area_of(q(:, triangle(1, k)), q(:, triangle(2, k)), q(:, triangle(3, k))))
+      end do
+      call check_close(whole, 12.0_dp, 1.0e-14_dp, "they fill what is around it")
+    end do
+    call clip_ears(bow, triangle, is_simple)
+    call check(.not. is_simple, "a polygon that crosses itself")
     do start = 0, 5
       p(:, :) = cshift(ell, start, dim=2)
-      call clip_ears(p, triangle)
+      call clip_ears(p, triangle, is_simple)
+      call check(is_simple, "no triangle lies on another")
       call check_equal(size(triangle, 2), 4, "triangles of six corners")
       whole = 0.0_dp
       do k = 1, 4
-        area = 0.5_dp*((p(1, triangle(2, k)) - p(1, triangle(1, k)))*(p(2, triangle(3, k)) - p(2, triangle(1, k))) &
-          & - (p(2, triangle(2, k)) - p(2, triangle(1, k)))*(p(1, triangle(3, k)) - p(1, triangle(1, k))))
+        area = area_of(p(:, triangle(1, k)), p(:, triangle(2, k)), p(:, triangle(3, k)))
         call check(area >= 0.0_dp, "no triangle is turned round")
         whole = whole + area
       end do
       call check_close(whole, 3.0_dp, 1.0e-15_dp, "they fill it")
     end do
-    call clip_ears(ell(:, 1:3), triangle)
+    call clip_ears(ell(:, 1:3), triangle, is_simple)
     call check(all(triangle(:, 1) == [1, 2, 3]) .and. size(triangle, 2) == 1, "a triangle is one")
   end subroutine test_ears
+
+  !> Area of a triangle in the plane, with a sign.
+  pure real(dp) function area_of(a, b, c)
+    real(dp), intent(in) :: a(3), b(3), c(3)
+    area_of = 0.5_dp*((b(1) - a(1))*(c(2) - a(2)) - (b(2) - a(2))*(c(1) - a(1)))
+  end function area_of
 
   subroutine write_file(file, text)
     character(len=*), intent(in) :: file, text

@@ -57,8 +57,8 @@ contains
   subroutine test_obj()
     type(error_t), allocatable :: error
 
-    call write_file("a.obj", "# a comment"//n//"o body"//n//points_text//"vn 0 0 1"//n//n//"f 1 3 2"//n//"f 1//1 2//1 4//1"// &
-      & achar(13)//n//"f 1/1/1 4/2/1 3/3/1"//n//"  f -3 -2 -1")
+    call write_file("a.obj", "# a comment"//n//"o body"//n//points_text//"vn 0 0 1"//n//n//"f 1 3 2 # base"//n// &
+      & "f 1//1 2//1 4//1"//achar(13)//n//"f 1/1/1 4/2/1 3/3/1"//n//"  f -3 -2 -1")
     call read_obj("a.obj", found, first, corner, error)
     call check_body(error, "obj")
     call check_equal(size(found, 2), 4, "obj: points")
@@ -176,7 +176,11 @@ contains
     call refuse_stl("solid"//n//"endsolid"//n, "a.stl: no triangle")
     text = ascii_of(1)
     call refuse_stl(text(1:index(text, "endloop") - 6), "a.stl: line 6: the file ends within a facet")
-    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n, "a.stl: line 3: a corner outside of facets of three")
+    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n, "a.stl: line 3: the file ends within a facet")
+    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 1 1"//n//"endfacet"//n, &
+      & "a.stl: line 5: a facet of 2 corners, but 3 were expected")
+    call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 1 1"//n//"vertex 1 1 1"//n// &
+      & "vertex 1 0 1"//n//"endfacet"//n, "a.stl: line 6: a fourth corner of a facet, but 3 were expected")
     call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertex 0 nan 1"//n, &
       & "a.stl: line 5: ""nan"", but a number was expected")
     call refuse_stl("solid"//n//"facet"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertex 0 0 1"//n//"vertices"//n, &
