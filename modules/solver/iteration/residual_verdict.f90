@@ -16,15 +16,43 @@ module gravier_residual_verdict
   use gravier_velocity_error, only: velocity_error_t, violations_allowed
   implicit none
   private
-  public :: residual_ends, residual_waits, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
+  public :: residual_ends, residual_waits, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of, vain_look_t
 
   !> the residual ends the solve; iterations go on; they would do so for ever
   integer, parameter :: residual_ends = 0, residual_waits = 1, residual_in_vain = 2
 
   !> times the accuracy up to which the velocity error, as the default criterion compares it, may be
   real(dp), parameter :: far = 10.0_dp
+  !> iterations before the first look
+  integer, parameter :: first_look = 1000
+
+  !> Looks, at iterations that double, whether a solve by the velocity error has no solution: where light bodies count much, its
+  !> error may fall for thousands of iterations that add to the impulses in vain.
+  type :: vain_look_t
+    integer, private :: next = first_look
+  contains
+    procedure :: take => vain_look_take
+  end type vain_look_t
 
 contains
+
+  !> The verdict on a residual within its tolerance where a look is due, else that it may end a solve. Collective.
+  subroutine vain_look_take(self, problem, method, velocity, iteration, residual, allowed, verdict)
+    class(vain_look_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
+    type(velocity_error_t), intent(inout) :: velocity
+    !> iterations made
+    integer, intent(in) :: iteration
+    !> over its tolerance; velocity error that the accuracy allows [m/s]
+    real(dp), intent(in) :: residual, allowed
+    integer, intent(out) :: verdict
+
+    verdict = residual_ends
+    if (iteration < self%next .or. residual > 1.0_dp) return
+    self%next = 2*iteration
+    call find_residual_verdict(problem, method, velocity, iteration, allowed, verdict)
+  end subroutine vain_look_take
 
   !> The verdict on a residual within its tolerance, by the whole estimate of the velocity error. Collective.
   subroutine find_residual_verdict(problem, method, velocity, iteration, allowed, verdict)

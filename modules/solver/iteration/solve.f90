@@ -10,11 +10,13 @@ module gravier_solve
   use gravier_convergence_history, only: convergence_history_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_check_schedule, only: check_schedule_t, growth_limit
+  use gravier_defect_growth, only: defect_growth_t
   use gravier_stagnation, only: stagnation_t
   use gravier_creeping_groups, only: creep_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_fresh_start, only: fresh_start_t
-  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, excess_of
+  use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, &
+    & excess_of, vain_look_t
   implicit none
   private
   public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
@@ -27,10 +29,6 @@ module gravier_solve
   !> met; not met in max_iterations; grown beyond bounds; not met, and nothing gained any more; no solution seems to exist
   integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2, solve_stagnated = 3, solve_unbounded = 4
 
-  !> growth taken for divergence where the method cannot mend it itself and the defect has stayed above the reference for so many
-  !> iterations, see also growth_limit of gravier_check_schedule
-  real(dp), parameter :: unmended_limit = 4.0_dp
-  integer, parameter :: unmended_iterations = 9
   !> figures of a check that a trace keeps
   integer, parameter :: n_traced = 6
 
@@ -131,12 +129,12 @@ module gravier_solve
     real(dp) :: reference = 0.0_dp
     !> when the solve began, and what its checks have taken [s]
     real(dp) :: began = 0.0_dp, checking = 0.0_dp
-    !> iteration from which on the defect has been above the reference, -1 where it is not; whether that is too long
-    integer :: exceeded_at = -1
-    logical :: grows = .false.
-    !> the criterion is by_velocity; by_residual: the verdict on a residual that is within its tolerance
+    type(defect_growth_t) :: growth
+    !> the criterion is by_velocity
     logical :: by_estimate = .false.
+    !> the verdict on a residual that is within its tolerance, of by_velocity at some iterations alone
     integer :: verdict = residual_ends
+    type(vain_look_t) :: look
   end type solve_state_t
 
 contains
@@ -401,6 +399,8 @@ contains
     if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
     report%velocity_error = merge(state%velocity%estimate(), 0.0_dp, report%residual > 0.0_dp)
     call find_whether_met(state, problem, method, control, report, met)
+    if (state%by_estimate .and. .not. met) call state%look%take(problem, method, state%velocity, report%iterations, &
+      & report%residual/control%tolerance, control%accuracy*problem%error_scale, state%verdict)
     call take_figure(state, problem, control, report)
     if (met) then
       report%status = solve_converged
@@ -410,8 +410,8 @@ contains
         & .not. (method%guarded .and. report%iterations < control%max_iterations)) then
       report%status = solve_diverged
     else
-      call note_growth(state, method%mends_growth(), report%iterations, defect)
-      if (state%grows) then
+      call state%growth%note(method%mends_growth(), report%iterations, defect, state%reference)
+      if (state%growth%unmended) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
         report%status = solve_exhausted
@@ -426,24 +426,6 @@ contains
     if (met .and. .not. state%by_estimate) call judge_accuracy(state, problem, control, report)
     if (control%trace .or. .not. met) call take_figure(state, problem, control, report)
   end subroutine judge
-
-  !> Note whether the defect has been above the reference for unmended_iterations and is unmended_limit times it, where the method
-  !> has no means against it.
-  subroutine note_growth(state, mends_growth, iterations, defect)
-    type(solve_state_t), intent(inout) :: state
-    logical, intent(in) :: mends_growth
-    integer, intent(in) :: iterations
-    real(dp), intent(in) :: defect
-
-    state%grows = .false.
-    if (mends_growth .or. .not. defect > state%reference) then
-      state%exceeded_at = -1
-    else if (state%exceeded_at < 0) then
-      state%exceeded_at = iterations
-    else
-      state%grows = iterations >= state%exceeded_at + unmended_iterations .and. defect > unmended_limit*state%reference
-    end if
-  end subroutine note_growth
 
   !> Whether more iterations promise nothing: because there is no solution, or because the method finds none. Collective.
   subroutine judge_stagnation(state, problem, method, control, report, has_stagnated)

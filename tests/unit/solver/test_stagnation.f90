@@ -1,8 +1,9 @@
-!> When a solve counts as one that gains nothing.
+!> When a solve counts as one that gains nothing, and as one whose defect grows.
 program test_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
   use gravier_stagnation, only: stagnation_t
+  use gravier_defect_growth, only: defect_growth_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   type(contact_problem_t) :: problem
@@ -16,6 +17,7 @@ program test_stagnation
   call check_equal(first_due(.true., 0.0_dp, 0.99999_dp), 1020, "one that falls by less than a tenth is")
   call check_equal(first_due(.true., 0.0_dp, 1.0001_dp, 0.9995_dp), 0, "no stagnation: the figure rises, the error falls")
   call check_equal(first_due(.true., 0.0_dp, 0.9995_dp, 1.0001_dp), 0, "no stagnation: the error rises, the figure falls")
+  call check_growth()
   call finish_checks()
 
 contains
@@ -42,5 +44,22 @@ contains
       return
     end do
   end function first_due
+
+  !> A defect that is five times its reference counts as growth after nine iterations above it, and never where it is mended.
+  subroutine check_growth()
+    type(defect_growth_t) :: growth
+    integer :: k
+
+    do k = 1, 12
+      call growth%note(.false., k, merge(0.5_dp, 5.0_dp, k == 2), 1.0_dp)
+      call check(growth%unmended .eqv. k == 12, "above the reference from the third iteration on")
+    end do
+    call growth%note(.false., 13, 3.0_dp, 1.0_dp)
+    call check(.not. growth%unmended, "above it, but less than four times")
+    call growth%note(.true., 14, 5.0_dp, 1.0_dp)
+    call check(.not. growth%unmended, "mended by the method")
+    call growth%note(.false., 15, 5.0_dp, 1.0_dp)
+    call check(.not. growth%unmended, "which begins anew")
+  end subroutine check_growth
 
 end program test_stagnation
