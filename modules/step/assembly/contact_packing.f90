@@ -197,7 +197,7 @@ contains
     type(packed_t), intent(in) :: this
     type(subproblem_t), intent(inout) :: sub
     real(dp), intent(inout), contiguous :: start(:, :)
-    real(dp) :: points(size(found%normal, 1), 2)
+    real(dp) :: points(size(found%normal, 1), 2), carried(size(found%normal, 1))
     integer :: nd, side, first
 
     nd = size(points, 1)
@@ -216,10 +216,14 @@ contains
     if (size(start, 2) > 0) call boundary%last_velocity_at(points(:, side), start(1:nd, sub%n_columns))
     if (this%terms%joins) return
     ! half of the way to the contact of the next step, and back to that of the last one
-    associate (body => view%bodies%velocity(1:nd, merge(this%j, this%i, side == 1)), normal => found%normal(:, this%f))
-      call add_travel(body, boundary%velocity(1:nd), boundary%spin, normal, 0.5_dp*physics%h, sub%v_free(1:nd, sub%n_columns))
-      if (size(start, 2) > 0) call add_travel(body, boundary%last_velocity(1:nd), boundary%last_spin, normal, &
-        & -0.5_dp*physics%h, start(1:nd, sub%n_columns))
+    associate (k => merge(this%j, this%i, side == 1), bodies => view%bodies, normal => found%normal(:, this%f), h => physics%h)
+      call boundary%velocity_at(bodies%position(:, k), carried)
+      call add_travel(bodies%velocity(1:nd, k), carried, boundary%velocity(1:nd), boundary%spin, normal, 0.5_dp*h, &
+        & sub%v_free(1:nd, sub%n_columns))
+      if (size(start, 2) == 0) return
+      call boundary%last_velocity_at(bodies%position(:, k), carried)
+      call add_travel(bodies%velocity(1:nd, k), carried, boundary%last_velocity(1:nd), boundary%last_spin, normal, -0.5_dp*h, &
+        & start(1:nd, sub%n_columns))
     end associate
   end subroutine add_column
 

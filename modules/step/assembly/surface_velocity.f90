@@ -12,6 +12,9 @@ module gravier_surface_velocity
   public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
     & add_image_velocity, boundary_that_has, add_travel
 
+  !> part of a velocity that counts as its rounding
+  real(dp), parameter :: rounded = 1.0e-12_dp
+
   !> Where two bodies touch.
   type :: contact_place_t
     !> from the centre of the candidate, and of an antagonist that is a grain, to the contact [m]
@@ -69,27 +72,32 @@ contains
     end if
   end subroutine find_start_velocity
 
-  !> Add to the velocity of a turning boundary at a contact what it changes by while the contact travels: with the boundary along
-  !> the normal, with the body across it. A body goes on from one place of contact to that of the next step with the velocity of
-  !> the end of a step: with that of the boundary at the first place, what sticks to a turntable would leave its circle by pi w h
-  !> of the radius in each turn. The normal is that of the contact, and the velocity along it stays.
-  pure subroutine add_travel(body, pivot, spin, normal, time, velocity)
-    !> velocities of the body and of the pivot of the boundary (nd) [m/s]; spin of the boundary [rad/s]
-    real(dp), intent(in) :: body(:), pivot(:), spin(3)
+  !> Add to the velocity of a turning boundary at a contact what it changes by while the contact travels as the centre of the body
+  !> does: with the boundary along the normal, with the body across it. A body goes on from one place of contact to that of the next
+  !> step with the velocity of the end of a step. With that of the boundary at the first place, what sticks to a turntable would
+  !> leave its circle by pi w h of the radius in each turn. The normal is that of the contact, and the velocity along it stays.
+  pure subroutine add_travel(body, carried, pivot, spin, normal, time, velocity)
+    !> velocities of the body, of the boundary at the centre of the body, and of its pivot (nd) [m/s]
+    real(dp), intent(in) :: body(:), carried(:), pivot(:)
+    !> of the boundary [rad/s]
+    real(dp), intent(in) :: spin(3)
     !> of the contact (nd)
     real(dp), intent(in) :: normal(:)
     !> for which the contact travels [s]
     real(dp), intent(in) :: time
     !> (nd) [m/s]
     real(dp), intent(inout) :: velocity(:)
-    real(dp) :: way(3), change(3)
+    real(dp) :: way(3), change(3), whole
     integer :: nd
 
     nd = size(velocity)
     way(:) = 0.0_dp
-    way(1:nd) = time*(body - pivot + sum((velocity - body)*normal)*normal)
+    way(1:nd) = time*(body - pivot + sum((carried - body)*normal)*normal)
     change(:) = cross(spin, way)
-    velocity(:) = velocity + change(1:nd) - sum(change(1:nd)*normal)*normal
+    whole = norm2(change)
+    change(1:nd) = change(1:nd) - sum(change(1:nd)*normal)*normal
+    ! in a drum that turns about its axis the change lies along the normal, but for rounding
+    if (norm2(change(1:nd)) > rounded*whole) velocity(:) = velocity + change(1:nd)
   end subroutine add_travel
 
   !> The boundary that body `k` is, or is glued to; 0 of a free grain.
