@@ -18,12 +18,14 @@ module gravier_output_files
 
 contains
 
-  !> Refuse an output directory that cannot be written to, an output whose place a directory or a file of another kind has, and an
-  !> input that the run would replace by an output. Rank 0 looks and writes nothing. Failure: status_input, with the key.
-  !> Collective.
-  subroutine check_paths(comm, config, error)
+  !> Refuse an output directory that cannot be written to, an output whose place a directory has, an input that the run would
+  !> replace by an output and, where a run begins, a file of another origin that it would replace. Rank 0 looks and writes nothing.
+  !> Failure: status_input, with the key. Collective.
+  subroutine check_paths(comm, config, begins, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
+    !> the run is none that goes on, which tells its files by what they hold
+    logical, intent(in) :: begins
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: reason
     character(len=:), allocatable :: names
@@ -46,6 +48,7 @@ contains
       do b = 1, size(config%insertions)
         call check_input(config%insertions(b)%radius_table, "&insertion '"//trim(config%insertions(b)%name)//"' radius_table")
       end do
+      if (begins) call check_origins(config, names, error)
     end if
     call comm%agree(error)
 
@@ -83,7 +86,7 @@ contains
       & "': expected a directory that can be written to: "//reason%message)
   end subroutine refuse_directory
 
-  !> Refuse outputs whose place a directory has, or a file of another kind. Not collective.
+  !> Refuse outputs whose place a directory has. Not collective.
   subroutine check_outputs(config, names, error)
     type(config_t), intent(in) :: config
     !> of the files, with commas between
@@ -102,12 +105,27 @@ contains
       if (is_directory(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
         & ": &output directory = '"//trim(config%output%directory)//"': a directory in it is called "//name// &
         & ", as a file of this run; expected another name for one of them")
-      if (allocated(error)) exit
+    end do
+  end subroutine check_outputs
+
+  !> Refuse outputs whose place a file of another origin has. Not collective.
+  subroutine check_origins(config, names, error)
+    type(config_t), intent(in) :: config
+    !> of the files, with commas between
+    character(len=*), intent(in) :: names
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
+    integer :: first
+
+    first = 1
+    do
+      call take_name(names, first, name)
+      if (name == "" .or. allocated(error)) exit
       if (.not. may_replace(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
         & ": &output directory = '"//trim(config%output%directory)//"': the file "//name//" in it is none of this program, "// &
         & "and is not replaced; expected another directory, or another name for that file")
     end do
-  end subroutine check_outputs
+  end subroutine check_origins
 
   !> Names of files that an older run has left in the output directory and that this one does not replace, with commas between.
   function older_files(config) result(found)

@@ -98,7 +98,7 @@ contains
     call reset_timers()
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
-    call check_paths(comm, config, error)
+    call check_paths(comm, config, .not. restart, error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory

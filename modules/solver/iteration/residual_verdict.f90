@@ -31,28 +31,19 @@ module gravier_residual_verdict
   type :: vain_look_t
     integer, private :: next = first_look
   contains
-    procedure :: take => vain_look_take
+    procedure :: is_due => vain_look_is_due
   end type vain_look_t
 
 contains
 
-  !> The verdict on a residual within its tolerance where a look is due, else that it may end a solve. Collective.
-  subroutine vain_look_take(self, problem, method, velocity, iteration, residual, allowed, verdict)
+  !> Whether a look is due after so many iterations; the next one then comes after twice as many.
+  logical function vain_look_is_due(self, iteration) result(is_due)
     class(vain_look_t), intent(inout) :: self
-    type(contact_problem_t), intent(inout) :: problem
-    class(method_t), intent(in) :: method
-    type(velocity_error_t), intent(inout) :: velocity
-    !> iterations made
     integer, intent(in) :: iteration
-    !> over its tolerance; velocity error that the accuracy allows [m/s]
-    real(dp), intent(in) :: residual, allowed
-    integer, intent(out) :: verdict
 
-    verdict = residual_ends
-    if (iteration < self%next .or. residual > 1.0_dp) return
-    self%next = 2*iteration
-    call find_residual_verdict(problem, method, velocity, iteration, allowed, verdict)
-  end subroutine vain_look_take
+    is_due = iteration >= self%next
+    if (is_due) self%next = 2*iteration
+  end function vain_look_is_due
 
   !> The verdict on a residual within its tolerance, by the whole estimate of the velocity error. Collective.
   subroutine find_residual_verdict(problem, method, velocity, iteration, allowed, verdict)

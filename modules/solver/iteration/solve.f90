@@ -399,8 +399,10 @@ contains
     if (report%iterations == 0) state%reference = max(defect, problem%force_scale)
     report%velocity_error = merge(state%velocity%estimate(), 0.0_dp, report%residual > 0.0_dp)
     call find_whether_met(state, problem, method, control, report, met)
-    if (state%by_estimate .and. .not. met) call state%look%take(problem, method, state%velocity, report%iterations, &
-      & report%residual/control%tolerance, control%accuracy*problem%error_scale, state%verdict)
+    if (state%by_estimate .and. .not. met .and. report%residual <= control%tolerance) then
+      if (state%look%is_due(report%iterations)) call find_residual_verdict(problem, method, state%velocity, report%iterations, &
+        & control%accuracy*problem%error_scale, state%verdict)
+    end if
     call take_figure(state, problem, control, report)
     if (met) then
       report%status = solve_converged

@@ -264,7 +264,9 @@ contains
     call expect_none(error, "files as they were written")
     call execute_command_line("cd '"//here//"' && cp own other && mv other own")
     call check_own_files(error)
-    call expect(error, status_failure, here//"/own: the file that was written under this name is not there any more", "replaced")
+    call expect(error, status_failure, here//"/own"// &
+      & ": the file that was written under this name is not there any more: it was removed, or another program has replaced it", &
+      & "replaced")
     call note_own(here//"/own")
     call check_own_files(error)
     call expect_none(error, "gone on with")
