@@ -1,5 +1,6 @@
 !> Where grains are at some instants of a run: states to compare, and motions that are known exactly.
 module gravier_accuracy_motion
+  use gravier_known_column, only: what_else_acts
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
@@ -122,7 +123,13 @@ contains
     call take_state(simulation, self%start)
     allocate (self%normal(nd), source=0.0_dp)
     known = simulation%config%scene%bodies == "column"
-    if (.not. known) call find_fall(self, simulation, known)
+    if (known) then
+      associate (gravity => simulation%config%scene%gravity(1:nd))
+        known = what_else_acts(simulation%config) == "" .and. gravity(nd) < 0.0_dp .and. .not. any(abs(gravity(1:nd - 1)) > 0.0_dp)
+      end associate
+    else
+      call find_fall(self, simulation, known)
+    end if
   end subroutine exact_motion_init
 
   !> One free grain over one plane at rest, gravity and velocity along its normal. Collective.
@@ -137,8 +144,10 @@ contains
     nd = motion%start%nd
     associate (boundaries => simulation%decomposition%boundaries, scene => simulation%config%scene)
       known = simulation%n_grains == 1 .and. simulation%n_glued == 0 .and. size(boundaries) == 1 .and. &
+        & size(simulation%config%laws) + size(simulation%config%insertions) == 0 .and. &
         & scene%gravity_table == "" .and. .not. any(abs(scene%body_force) > 0.0_dp) .and. .not. simulation%decomposition%period%on()
       if (known) known = boundaries(1)%is_plane() .and. .not. boundaries(1)%is_driven() .and. &
+        & boundaries(1)%remove_at >= huge(1.0_dp) .and. .not. allocated(boundaries(1)%table%has) .and. &
         & .not. any(abs(boundaries(1)%velocity) > 0.0_dp) .and. .not. any(abs(boundaries(1)%spin) > 0.0_dp)
       if (.not. known) return
       motion%normal(:) = boundaries(1)%surface%axis(1:nd)

@@ -61,7 +61,7 @@ contains
     real(dp) :: parts(1, size(simulation%problem%sub)), sums(1)
     integer :: s
 
-    scale = norm2(simulation%physics%gravity)*simulation%physics%h
+    scale = simulation%velocity_scale%value
     if (scale > 0.0_dp) return
     do s = 1, size(simulation%problem%sub)
       associate (sub => simulation%problem%sub(s))

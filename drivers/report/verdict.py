@@ -6,6 +6,8 @@ import numpy
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with mended overlaps, the velocity error over U
 OFTEN, FAR_OFF = 0.1, 0.5
+#: the parts of the energy turned over up to which a balance is one, and up to which it is nearly one
+BALANCED, UNBALANCED = 1e-4, 1e-2
 
 
 class Answer:
@@ -97,7 +99,12 @@ def mended(log, history):
 
 def balanced(log):
     said = log.value("energy")
-    return [Answer("Do the energies balance?", GOOD, said[0].upper() + said[1:] + ".")] if said.startswith("balance") else []
+    found = re.match(r"balance off by (\S+) J, of (\S+) J turned over", said)
+    if not found:
+        return []
+    off, turned = (float(text) for text in found.groups())
+    grade = GOOD if off <= BALANCED * turned else DOUBT if off <= UNBALANCED * turned else BAD
+    return [Answer("Do the energies balance?", grade, said[0].upper() + said[1:] + ".")]
 
 
 def readable(notes):

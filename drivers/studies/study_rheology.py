@@ -70,7 +70,7 @@ def flow(folder, dimension, number, taken):
     parts = [np.array_split(history[name][late], 8) for name in ("stress_xy", "stress_yy", "solid_fraction")]
     mu = [-np.mean(a) / np.mean(b) for a, b in zip(parts[0], parts[1])]
     phi = [np.mean(c) for c in parts[2]]
-    return np.mean(mu), np.mean(phi), np.std(mu) / np.sqrt(8.0), np.std(phi) / np.sqrt(8.0)
+    return np.mean(mu), np.mean(phi), np.std(mu, ddof=1) / np.sqrt(8.0), np.std(phi, ddof=1) / np.sqrt(8.0)
 
 
 def power_law(numbers, values, errors):

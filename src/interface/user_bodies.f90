@@ -218,6 +218,10 @@ contains
         if (found(k) == 0) call raise(error, status_input, "remove: body "//to_text(id(k))// &
           & ": no free body of the scene; expected an identifier of one")
       end do
+      associate (simulation => loop%run%simulation)
+        if (any(simulation%cell_drive%driven) .and. n >= simulation%n_grains - simulation%n_glued) call raise(error, status_input, &
+          & "remove: no free body would be left in a cell that stresses drive; expected one that stays")
+      end associate
       if (allocated(error)) return
       call move_alloc(all_ids, decomposition%dismissed)
       allocate (numbers(size(id)))

@@ -124,8 +124,8 @@ contains
     if (allocated(error)) self%cause = error
   end subroutine user_loop_stop
 
-  !> Write a checkpoint of the present step. Failures (status_input): the run is over; bodies were added or removed, which enter and
-  !> leave with the next step and would be lost. Collective.
+  !> Write a checkpoint of the present step. Failures (status_input): the run is over; velocities were set, whose energy the balance
+  !> takes with the next step; bodies were added or removed, which enter and leave with the next step and would be lost. Collective.
   subroutine user_loop_write_checkpoint(self, error)
     class(user_loop_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
@@ -136,6 +136,11 @@ contains
       return
     end if
     associate (simulation => self%run%simulation)
+      if (self%comm%any_true(self%velocities_set)) then
+        call raise(error, status_input, "checkpoint: velocities were set, which take effect with the next step; expected a "// &
+          & "checkpoint before that, or after that step")
+        return
+      end if
       if (simulation%inflow%given%n > 0 .or. allocated(simulation%decomposition%dismissed)) then
         call raise(error, status_input, "checkpoint: bodies that were added or removed enter or leave at the start of the next "// &
           & "step; expected a checkpoint before these calls, or after that step")
@@ -289,6 +294,8 @@ contains
     integer :: k
 
     call self%check_array(name, s, values, error)
+    if (.not. self%goes_on() .and. .not. allocated(error)) call raise(error, status_input, name//": the run is over after step "// &
+      & to_text(self%run%simulation%step)//"; expected a run that goes on")
     if (allocated(error)) return
     associate (owned => self%run%simulation%decomposition%owned(s))
       if (name == "force") then

@@ -74,6 +74,8 @@ contains
     run%command = command
     run%input_text = simulation%config%text
     run%dimension = simulation%config%scene%dimension
+    run%period(:) = simulation%decomposition%period%length
+    run%origin(:) = simulation%decomposition%period%origin
     call self%file%open(simulation%comm, directory//"results.h5", run, error)
     call describe_boundaries(simulation, boundaries)
     call self%file%write_table(boundaries, error)

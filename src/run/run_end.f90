@@ -60,7 +60,7 @@ contains
       else if (time%stop_mass_at_least_given .and. mass >= time%stop_mass_at_least .and. &
         & seen%lightest < time%stop_mass_at_least) then
         why = to_text(mass, 7)//" kg of grains in the scene, stop_mass_at_least = "//to_text(time%stop_mass_at_least, 7)//" kg"
-      else if (simulation%watched > 0) then
+      else if (is_watched(simulation)) then
         way = displacement(simulation)
         if (way >= (1.0_dp - rounding)*time%stop_displacement) why = "boundary '"//trim(time%stop_boundary)//"' has moved by "// &
           & to_text(way, 7)//" m, stop_displacement = "//to_text(time%stop_displacement, 7)//" m"
@@ -121,6 +121,14 @@ contains
       end associate
     end do
   end function rests
+
+  !> Whether the boundary of stop_boundary is there: one that is removed has no place.
+  pure logical function is_watched(simulation)
+    type(simulation_t), intent(in) :: simulation
+
+    is_watched = simulation%watched > 0
+    if (is_watched) is_watched = simulation%decomposition%boundaries(simulation%watched)%present
+  end function is_watched
 
   !> How far the boundary of stop_boundary is from its place at the start of the scene [m].
   real(dp) function displacement(simulation) result(way)

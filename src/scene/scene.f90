@@ -22,6 +22,7 @@ module gravier_scene
   use gravier_pair_laws, only: set_default_laws
   use gravier_method_choice, only: check_moments
   use gravier_scene_cell, only: cell_moves, check_cell
+  use gravier_known_column, only: what_else_acts
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
   use gravier_run_memory, only: check_planned_grains, check_read_grains, check_entering_grains
@@ -250,11 +251,13 @@ contains
   subroutine check_exact_solution(config, error)
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: what
     integer :: nd
 
     if (config%solver%criterion /= "error") return
-    if (size(config%insertions) > 0) call raise(error, status_input, config%file// &
-      & ": &solver criterion = 'error': expected another where grains enter: the impulses of the column alone are known")
+    what = what_else_acts(config)
+    if (what /= "") call raise(error, status_input, config%file//": &solver criterion = 'error': expected another "//what// &
+      & ": the impulses of the column alone are known")
     nd = config%scene%dimension
     if (any(abs(config%scene%gravity(1:nd - 1)) > 0.0_dp) .or. config%scene%gravity(nd) >= 0.0_dp) &
       & call raise(error, status_input, config%file//": &scene gravity: criterion = 'error' knows the column under gravity "// &

@@ -253,6 +253,18 @@ class BadInput(Studies):
         self.refused("two balls", {"kind": "run", "vary": "step", "values": "0.01", "reference": "exact"},
                      ": &study reference = 'exact': expected 'tight' or 'none'", case=BALL_CASE,
                      files={"ball.csv": BALL + "3,grain,1.0,0.21,0.01,,\n"})
+        material = {"material": [{"name": "m"}], "scene": {"wall_material": "m"}, "law": [{"materials": "m", "kind": "coulomb"}]}
+        for name, case in (("law", material), ("removed", {"boundary": [{"name": "w", "shape": "wall", "wall": "2", "remove_at": 0.2}]})):
+            self.refused(f"ball, {name}", {"kind": "run", "vary": "step", "values": "0.01", "reference": "exact"},
+                         ": &study reference = 'exact': expected 'tight' or 'none'", case=merged(BALL_CASE, case), files={"ball.csv": BALL})
+        known = {**COLUMN_CASE, "solver": {}, "time": {"step": 1e-3, "steps": 10}}
+        for name, case in (("pulled", {"scene": {"body_force": [0.0, -1.0]}}), ("table", {"scene": {"gravity": None, "gravity_table": "g.csv"}}),
+                           ("ground that goes", {"boundary": [{"name": "g", "shape": "wall", "wall": "-y", "remove_at": 0.005}]}),
+                           ("ground that moves", {"boundary": [{"name": "g", "shape": "wall", "wall": "-y", "velocity": [0.0, 1.0]}]}),
+                           ("lid", {"boundary": [{"name": "lid", "shape": "plane", "point": [0.0, 9.0], "normal": [0.0, -1.0]}]}),
+                           ("law", material), ("tilted", {"scene": {"gravity": [1.0, -9.81]}})):
+            self.refused(f"column, {name}", {"kind": "run", "vary": "step", "values": "1e-3", "reference": "exact"},
+                         ": &study reference = 'exact': expected 'tight' or 'none'", case=merged(known, case), files={"g.csv": "time,gy\n0,-9.81\n"})
         self.refused("no steps", {"kind": "run", "vary": "tolerance", "values": "1e-2", "reference": "none"},
                      ": 'case' of case.nml: &time steps = 0: expected an integer >= 1",
                      case=merged(COLUMN_CASE, {"time": {"steps": 0}}))

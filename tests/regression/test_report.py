@@ -25,6 +25,7 @@ sys.path.insert(0, os.path.join(SOURCE, "drivers/report"))
 import gravier_report  # noqa: E402
 from asked import is_default  # noqa: E402
 from run_log import RunLog  # noqa: E402
+import verdict  # noqa: E402
 
 BROWSER = os.environ.get("GRAVIER_BROWSER") or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 CASE = {"scene": {"title": "disks <in> a box & a lid", "bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.008, "radius_max": 0.012,
@@ -160,6 +161,19 @@ class Report(RunTestCase):
         self.assertTrue(said.endswith(page.text["last-words"] + "\n"))
         self.assertIn("\nconverged ", page.text["last-words"])
         self.assertNotIn("sweeps            ", page.text["last-words"])
+
+    def test_balance(self):
+        """A balance that is off by a part of the energy turned over is none."""
+        class Said:
+            def __init__(self, text):
+                self.text = text
+
+            def value(self, name):
+                return self.text if name == "energy" else ""
+        for off, grade in (("1.0E-13", "good"), ("1.0E-03", "doubt"), ("2.1E+00", "bad")):
+            (answer,) = verdict.balanced(Said(f"balance off by {off} J, of 2.09E+00 J turned over"))
+            self.assertEqual(answer.grade, grade)
+        self.assertEqual(verdict.balanced(Said("")), [])
 
     def test_what_was_asked(self):
         """Keys with other values than the defaults, with units, defaults and meanings; a density that is the default is left out."""

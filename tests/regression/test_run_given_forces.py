@@ -205,6 +205,29 @@ class GivenForces(RunTestCase):
                 self.assertLess(abs(found.sum() - normal.sum()), 0.02 * np.abs(normal).sum())
                 self.assertLess(run.history()["iterations"][0], 20)
 
+    def test_period_of_a_bodies_file(self):
+        """A period that came with the bodies goes on with them: in results.h5, in gravier.Run, and in the files that gravier.write_bodies makes."""
+        case = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [6, 3], "radius_min": 0.01, "radius_max": 0.01, "friction": 0.3,
+                          "period": [0.13, 0.0], "period_origin": [-0.02, 0.0]},
+                "time": {"step": STEP, "steps": 20}, "output": {"directory": "results", "every": 20, "contacts": True, "final_bodies": True}}
+        first = run_case(case, 1, self.here("period"))
+        self.assert_status(first, 0)
+        follow = merged(case, {"scene": {"bodies": "file", "bodies_file": "bodies.h5", "lattice_count": None, "radius_min": None, "radius_max": None,
+                                         "period": None, "period_origin": None}})
+        given = first.path("results", "final_bodies.h5")
+        for title in ("period goes on", "period goes on again"):
+            directory = self.here(title)
+            os.makedirs(directory)
+            shutil.copy(given, os.path.join(directory, "bodies.h5"))
+            run = run_case(follow, 1, directory)
+            self.assert_status(run, 0)
+            read = package.Run(run.path("results"))
+            np.testing.assert_array_equal(read.period, [0.13, 0.0])
+            np.testing.assert_array_equal(read.origin, [-0.02, 0.0])
+            given = self.here(title + ".h5")
+            package.write_bodies(read, given)
+            np.testing.assert_array_equal(package.BodiesFile(given).period, [0.13, 0.0])
+
     def test_states_of_results(self):
         """gravier.write_bodies makes of the last state in results.h5, whose numbers have single precision or more, what final_bodies.h5
         has; a run starts from it."""

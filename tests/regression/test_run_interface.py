@@ -163,6 +163,27 @@ class Results(RunTestCase):
         # before the first sweep no impulse is right
         self.assertEqual(run.trace()["error"][0], 1.0)
 
+    def test_error_that_is_not_known(self):
+        """The criterion 'error' is refused where something else than gravity acts on the column."""
+        column = {"scene": {"bodies": "column", "column_count": 4, "friction": 0.0}, "time": {"step": 1e-3, "steps": 40},
+                  "solver": {"criterion": "error", "tolerance": 1e-6}}
+        ground = "where there is a boundary beside the ground, or the ground moves or goes away"
+        for name, case, what in (
+                ("goes", {"boundary": [{"name": "w", "shape": "wall", "wall": "-y", "remove_at": 0.005}]}, ground),
+                ("moves", {"boundary": [{"name": "w", "shape": "wall", "wall": "-y", "velocity": [0.0, 1.0]}]}, ground),
+                ("lid", {"boundary": [{"name": "w", "shape": "plane", "point": [0.0, 9.0], "normal": [0.0, -1.0]}]}, ground),
+                ("pulled", {"scene": {"body_force": [0.0, -1.0]}}, "where a gravity_table or a body_force acts"),
+                ("table", {"scene": {"gravity_table": "g.csv"}}, "where a gravity_table or a body_force acts")):
+            directory = self.here(f"not known {name}")
+            os.makedirs(directory)
+            write(os.path.join(directory, "g.csv"), "time,gy\n0,-9.81\n")
+            run = run_case(merged(column, case), directory=directory)
+            self.assert_status(run, 2)
+            self.assertIn(f"case.nml: &solver criterion = 'error': expected another {what}: the impulses of the column alone are known", str(run))
+        named = run_case(merged(column, {"time": {"steps": 1}, "boundary": [{"name": "w", "shape": "wall", "wall": "-y", "friction": 0.2}]}),
+                         directory=self.here("not known named"))
+        self.assert_status(named, 0)
+
     def test_layout(self):
         for dimension, n, walls in ((2, 30, 3), (3, 36, 5)):
             run = self.runs[dimension]

@@ -163,6 +163,11 @@ class Stops(RunTestCase):
         self.assertEqual(len(run.history()["step"]), 5)
         self.assertNotIn("ended ", run.stdout)
 
+    def test_a_boundary_that_is_gone_ends_nothing(self):
+        run = self.play("gone", BELT, {"boundary": [{**BELT["boundary"][0], "remove_at": 0.01}], "time": {"steps": 80}})
+        self.assertEqual(len(run.history()["step"]), 80)
+        self.assertNotIn("ended ", run.stdout)
+
     def test_the_same_steps(self):
         """A run that is ended early has the steps of one that is not."""
         whole = self.play("whole", FALL, {"time": {"steps": 100}})

@@ -211,6 +211,16 @@ class Forces(SmallScene):
                 np.testing.assert_allclose((sign[:, None] * moment).sum(axis=0), [history[f"moment_{axis}:{name}"][step - 1] for axis in names],
                                            rtol=0, atol=2e-4 * whole)
 
+    def test_moment_where_overlaps_are_projected(self):
+        """A floor that forces move is shifted by a projection in the first step: its moment is about the pivot that it had at the contact."""
+        floor = plane([0.0, 0.0], [0.0, 1.0], free=[False, True], force=[0.0, 30.82], mass=3.0, name="floor", pivot=[0.0, 0.0])
+        record = self.play("projected", [Grain([0.3, 0.095], radius=0.1, mass=3.0)], [floor], [3.0, -G], 3,
+                           scene={"friction": 0.5, "rotation": False, "overlap_allowed": 1e-4},
+                           output={"boundary_forces": True, "boundary_moments": True})
+        history = record.run.history()
+        self.assertGreater(history["projected"][0], 0)
+        self.verify("grain on a floor that is shifted", "moment of the floor [N m]", history["moment_z:floor"][0], 0.3 * history["force_y:floor"][0], 1e-9)
+
     def test_piston_that_moves_at_the_start(self):
         """A piston with a velocity at the start is slowed down by its force, and meets a grain that stops it: both go on together."""
         mass, force, speed = 1.3, 2.0, 0.4

@@ -46,6 +46,16 @@ class Program(RunTestCase):
             if row in rows[:3]:
                 self.assertLessEqual(float(row["projection"]), float(row["true_error"]) * (1.0 + 1e-6))
 
+    def test_scale(self):
+        """Errors are divided by the velocity that a run compares them with, be it given or that of the loads of a step."""
+        lid = {"name": "lid", "shape": "plane", "point": [0.0, 0.3], "normal": [0.0, -1.0], "free": [False, True], "mass": 1.0, "force": [0.0, -100.0]}
+        for name, case in (("pulled", {"scene": {**COLUMN["scene"], "body_force": [0.0, -1e4]}}), ("given", {"solver": {"velocity_scale": 0.5}}),
+                           ("lid", {"scene": {**COLUMN["scene"], "gravity": [0.0, 0.0]}, "boundary": [lid]})):
+            case = {**COLUMN, **case, "output": {"directory": "results"}}
+            (row,) = self.table(name, case, "--rest", "--situations", "cold", "--iterations", "8")
+            run = gravier("case.nml", directory=self.here(name))
+            self.assertAlmostEqual(float(row["velocity_scale"]) / run.history()["velocity_scale"][0], 1.0, delta=1e-6, msg=name)
+
     def test_same_as_the_solver(self):
         """A state looked at is that of a solve by the program with as many iterations, and so is its estimate; below 15 levels there is no
         pass over layers."""

@@ -36,6 +36,7 @@ class Effects(LoopTestCase):
         super().setUpClass()
         rows = [f"{8 * j + i + 1},{0.0251 * i},{0.0248 * j},{0.009 + 0.003 * np.sin(7.0 * i + 3.0 * j) ** 2}" for j in range(8) for i in range(8)]
         write(os.path.join(cls.scratch, "press.csv"), "id,x,y,radius\n" + "\n".join(rows) + "\n")
+        write(os.path.join(cls.scratch, "cell.csv"), "id,x,y,radius,vx,vy\n1,0.2,0.2,0.05,1,2\n2,0.5,0.5,0.05,0,1\n3,0.8,0.3,0.05,1,0\n")
         write(os.path.join(cls.scratch, "sphere.csv"), "id,x,y,z,radius\n1,0,0,0,0.01\n")
 
     def bodies(self, run):
@@ -240,6 +241,37 @@ with gravier.Simulation(case, quiet=True, forces=True) as s:
             asleep = runs[0].history()["sleeping"]
             self.assertGreater(asleep[1199], 20)
             self.assertEqual(asleep[1200], 0)
+
+    def test_bodies_of_a_cell_that_moves(self):
+        """What is taken out of a cell, and velocities that are set, are counted once; the last body of a cell that stresses drive stays."""
+        case = {"scene": {"bodies": "file", "bodies_file": "../cell.csv", "period": [1.0, 1.0], "gravity": [0.0, 0.0], "cell_shear_rate": 0.5},
+                "time": {"step": 1e-3, "steps": 12}, "output": {"directory": "results", "every": 0, "energy": True}}
+        script = """
+with gravier.Simulation(case, quiet=True) as s:
+    while s.goes_on:
+        s.step()
+        if s.made == 3:
+            s.remove([1])
+        if s.made == 6:
+            s.bodies.velocity = np.zeros_like(s.bodies.velocity)
+"""
+        history = self.play("moving cell", case, script).history()
+        self.assertGreater(history["carried_away"][-1], 1e-3)
+        self.assertLess(np.abs(history["energy_error"]).max(), 1e-12 * history["carried_away"][-1])
+        last = """
+with gravier.Simulation(case, quiet=True) as s:
+    s.step()
+    try:
+        s.remove([1, 2, 3])
+    except gravier.SimulationError as error:
+        assert str(error) == "remove: no free body would be left in a cell that stresses drive; expected one that stays", str(error)
+    else:
+        raise AssertionError("not refused")
+    s.remove([1, 2])
+    while s.goes_on:
+        s.step()
+"""
+        self.play("driven cell", merged(case, {"scene": {"cell_shear_rate": None, "cell_pressure": [100.0, 100.0]}}), last)
 
     def test_bodies_come_and_go(self):
         script = """

@@ -72,6 +72,7 @@ REFUSED = [
      "add_bodies: body 1: it overlaps a body that was added before; expected a free place"),
     ("s.remove([1, 9999])", "remove: body 9999: no free body of the scene; expected an identifier of one"),
     ("s.remove([1, 1])", "remove: body 1: removed twice; expected each identifier once"),
+    ("s.remove(np.array([2**63], dtype=np.uint64))", "remove: body 9223372036854775808: no free body of the scene; expected an identifier of one"),
     ("s.remove([1.5])", "remove: expected identifiers, which are whole numbers"),
     ("gravier.Simulation('case.nml')", "open: a simulation is open in this process; expected that it is closed before"),
 ]
@@ -79,6 +80,7 @@ REFUSED = [
 OVER = [("s.step()", "step: the run is over after step 60; expected a run that goes on"),
         ("s.checkpoint()", "checkpoint: the run is over after step 60; expected a run that goes on"),
         ("s.add_bodies([[0.05, 0.5]], 0.01)", "add_bodies: the run is over; expected a run that goes on"),
+        ("s.bodies.velocity = np.array(s.bodies.velocity)", "velocity: the run is over after step 60; expected a run that goes on"),
         ("s.remove([1])", "remove: the run is over; expected a run that goes on")]
 ENDED = "MPI has been ended in this process; expected one in which it runs or can be started"
 BOUNDARIES = [{"name": "lid", "shape": "plane", "point": [0.0, 2.0], "normal": [0.0, -1.0], "free": [False, True], "mass": 1.0},
@@ -136,6 +138,16 @@ with gravier.Simulation(case, quiet=True) as s:
         else:
             raise AssertionError("a checkpoint that loses what was added or removed")
         s.step()
+    s.bodies.velocity = np.array(s.bodies.velocity)
+    try:
+        s.checkpoint()
+    except gravier.SimulationError as error:
+        assert str(error) == ("checkpoint: velocities were set, which take effect with the next step; expected a checkpoint before that, "
+                              "or after that step"), str(error)
+    else:
+        raise AssertionError("a checkpoint whose balance does not know the velocities")
+    s.step()
+    s.checkpoint()
     while s.goes_on:
         s.step()
     for statement, line in {OVER!r}:

@@ -30,7 +30,7 @@ def given_contacts(run, step=None):
 
 def write_bodies(run, path, step=None):
     """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
-    and periods are those of its input; walls of a bodies file are in this one. A cell that moves has no such file. A file that is there is
+    and periods are those of its input; walls and periods of a bodies file are in this one. A cell that moves has no such file. A file that is there is
     replaced where this function has made it."""
     try:
         check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [run.path])
@@ -53,6 +53,8 @@ def write_bodies(run, path, step=None):
         walls = [k for k, name in enumerate(boundaries.name) if name == f"wall {boundaries.id[k]}"]
         if walls:
             file["walls/id"], file["walls/point"], file["walls/normal"] = (boundaries[key][walls] for key in ("id", "position", "normal"))
+        if np.any(run.period > 0.0) and "period" not in run.case.get("scene", [{}])[0]:
+            file["box/origin"], file["box/period"] = run.origin, run.period
         if len(contacts["candidate"]):
             for name, values in contacts.items():
                 file[f"contacts/{name}"] = values

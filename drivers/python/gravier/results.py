@@ -97,7 +97,8 @@ def read_table(path, columns=()):
 class Run:
     """The output directory of a run, finished or under way. Files are opened when something is read, and closed again.
 
-    dimension, version, command, input_text: as in /run of results.h5; case: the input by groups; steps, times: what is written.
+    dimension, version, command, input_text: as in /run of results.h5; period, origin: of the start, 0 along axes that are not periodic;
+    case: the input by groups; steps, times: what is written.
     """
 
     _kind = "the results of a run"
@@ -114,6 +115,7 @@ class Run:
             what = file["run"].attrs
             self.dimension = int(what["dimension"])
             self.version, self.command, self.input_text = (_text(what[name]) for name in ("version", "command", "input_text"))
+            self.period, self.origin = (np.array([what.get(f"{name}_{axis}", 0.0) for axis in "xyz"[:self.dimension]]) for name in ("period", "origin"))
             self.steps = np.array(sorted(int(name) for name in file["steps"]), dtype=int)
             self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
             self.case = parse_namelist(self.input_text)
@@ -390,8 +392,7 @@ class Run:
         cell = self.cell(step)
         if cell is not None:
             return cell.edge[::-1]
-        period = entries(self.case.get("scene", [{}])[0], "period", np.zeros(self.dimension))
-        return np.diag(period)[period > 0]
+        return np.diag(self.period)[self.period > 0]
 
     @staticmethod
     def _rows(bodies, contacts):
@@ -414,6 +415,7 @@ class BodiesFile(Run):
         self.directory = self.path.parent
         with self._open() as file:
             self.dimension = int(file["bodies/position"].shape[1])
+            self.period, self.origin = (self._values(file[f"box/{name}"]) if "box" in file else np.zeros(self.dimension) for name in ("period", "origin"))
         self.steps, self.times, self.case = np.array([0]), np.array([0.0]), {}
 
     def _check(self, file):

@@ -450,6 +450,8 @@ class Simulation:
         ids = np.atleast_1d(np.array(_plain(ids)))
         if ids.ndim != 1 or (ids.size and ids.dtype.kind not in "iu"):
             raise SimulationError("remove: expected identifiers, which are whole numbers")
+        for number in ids[(ids < 0) | (ids > np.iinfo(np.int64).max)] if ids.size else ():
+            raise SimulationError(f"remove: body {number}: no free body of the scene; expected an identifier of one")
         ids = ids.astype(np.int64)
         call("remove_bodies", self.handle, len(ids), ids.ctypes.data)
 

@@ -23,6 +23,8 @@ module gravier_results_file
     character(len=:), allocatable :: input_text
     !> 2 or 3
     integer :: dimension = 2
+    !> of the start, 0 along axes that are not periodic; lower corner [m]
+    real(dp) :: period(3) = 0.0_dp, origin(3) = 0.0_dp
   end type provenance_t
 
   !> Counts of equal bins that begin at 0.
@@ -99,6 +101,8 @@ contains
     !> the same on all ranks
     type(provenance_t), intent(in) :: run
     type(error_t), allocatable, intent(inout) :: error
+    character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+    integer :: d
 
     if (allocated(error)) return
     self%comm = comm
@@ -110,6 +114,11 @@ contains
     call self%file%write_attribute("/run", "command", run%command, error)
     call self%file%write_attribute("/run", "input_text", run%input_text, error)
     call self%file%write_attribute("/run", "dimension", run%dimension, error)
+    do d = 1, run%dimension
+      if (.not. run%period(d) > 0.0_dp) cycle
+      call self%file%write_attribute("/run", "period_"//axes(d), run%period(d), error)
+      call self%file%write_attribute("/run", "origin_"//axes(d), run%origin(d), error)
+    end do
     call self%file%make_group("/steps", error, members=steps_in_block)
     call self%file%show(error)
   end subroutine results_open

@@ -22,9 +22,12 @@ module gravier_boundary_moments
     !> mean moment of the contacts in the step about the place of the pivot at q_m: about the third axis in 2D, about three in 3D
     !> (1 or 3, boundaries) [N m]
     real(dp), allocatable :: moment(:, :)
+    !> of the middle of the step (3, boundaries) [m]
+    real(dp), private, allocatable :: pivot(:, :)
   contains
     procedure, nopass :: features => boundary_moments_features
     procedure :: begin => boundary_moments_begin
+    procedure :: take_step => boundary_moments_take_step
     procedure :: measure => boundary_moments_measure
     procedure :: columns => boundary_moments_columns
   end type boundary_moments_t
@@ -48,12 +51,23 @@ contains
 
     associate (boundaries => decomposition%boundaries, unused => physics)
       allocate (self%name(size(boundaries)))
-      allocate (self%moment(2*decomposition%nd - 3, size(boundaries)), source=0.0_dp)
+      allocate (self%moment(2*decomposition%nd - 3, size(boundaries)), self%pivot(3, size(boundaries)), source=0.0_dp)
       do b = 1, size(boundaries)
         self%name(b) = name_in_columns(boundaries(b)%name)
       end do
     end associate
   end subroutine boundary_moments_begin
+
+  !> Keep the pivots of the middle of the step, where contacts have their places: projections of overlaps may shift them.
+  subroutine boundary_moments_take_step(self, step)
+    class(boundary_moments_t), intent(inout) :: self
+    type(solved_step_t), intent(in) :: step
+    integer :: b
+
+    do b = 1, size(self%pivot, 2)
+      self%pivot(:, b) = step%decomposition%boundaries(b)%pivot
+    end do
+  end subroutine boundary_moments_take_step
 
   !> Sum the moments of the contacts, exactly the same whatever the number of ranks. Collective.
   subroutine boundary_moments_measure(self, step)
@@ -71,7 +85,7 @@ contains
           if (all(sub%pair(:, c) <= sub%n_grains)) cycle
           b = sub%boundary(sub%pair(merge(2, 1, sub%pair(2, c) > sub%n_grains), c))
           if (b == 0) cycle
-          call find_moment(step%problem, step%halo%view(s), s, c, step%decomposition%boundaries(b), step%physics, moment)
+          call find_moment(step%problem, step%halo%view(s), s, c, step%decomposition%boundaries(b), self%pivot(:, b), moment)
           if (sub%pair(2, c) > sub%n_grains) moment(:) = -moment
           first = (b - 1)*n
           parts(first + 1:first + n, s) = parts(first + 1:first + n, s) + moment(4 - n:3)
@@ -86,13 +100,14 @@ contains
 
   !> Moment of the impulse of a contact on its candidate about the pivot of a boundary, with the moments of rolling and pivoting
   !> friction [N m s].
-  pure subroutine find_moment(problem, view, s, c, boundary, physics, moment)
+  pure subroutine find_moment(problem, view, s, c, boundary, pivot, moment)
     type(contact_problem_t), intent(in) :: problem
     type(local_bodies_t), intent(in) :: view
     !> subdomain and contact
     integer, intent(in) :: s, c
     type(boundary_t), intent(in) :: boundary
-    type(physics_t), intent(in) :: physics
+    !> in the middle of the step [m]
+    real(dp), intent(in) :: pivot(3)
     real(dp), intent(out) :: moment(3)
     real(dp) :: p(3), place(3), arm(3), rolling(lanes, 3)
 
@@ -104,9 +119,8 @@ contains
       ! disks and spheres touch a boundary on its surface; all other contacts are half-way between the surfaces
       if (row%arm_i == 0 .and. view%list%antagonist(sub%source(c)) < 0) &
         & place(1:nd) = place(1:nd) - 0.5_dp*sub%gap(c)*sub%hot(q, 1:nd, g)
-      ! the pivot has moved to the end of the step
       call boundary%find_image(place(1:nd), arm)
-      arm(:) = arm - (boundary%pivot - physics%theta*physics%h*boundary%velocity)
+      arm(:) = arm - pivot
       moment(:) = cross(arm, p)
       if (row%rolling_radius == 0) return
       if (nd == 2) then

@@ -169,11 +169,13 @@ contains
       parts(in_springs + 1:in_springs + 3, s) = springs
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
-    if (step%problem%cell%moves) then
-      ! grains that cross the cell have the velocity of another image: nothing else is taken out of such a scene
+    if (step%others) then
+      self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
+    else if (step%problem%cell%moves) then
+      ! grains that cross the cell have the velocity of another image; in a step before which bodies were taken away or set, that
+      ! is a part of what these have carried away
       self%boundary_work = self%boundary_work - (self%translation + self%rotation - sums(in_start))
     end if
-    if (step%others) self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
     self%translation = sums(in_translation)
     self%rotation = sums(in_rotation)
     self%load_work = self%load_work + sums(in_load)

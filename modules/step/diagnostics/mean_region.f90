@@ -152,7 +152,9 @@ contains
     real(dp), intent(in) :: x, from, period
 
     y = x
-    if (period > 0.0_dp) y = x - period*floor((x - from)/period)
+    if (.not. period > 0.0_dp) return
+    ! rounding must not put it below the side
+    y = max(x - period*floor((x - from)/period), from)
   end function image_above
 
   !> The parts of the volume of a ball, a disk in 2D, in the bins. Exact where sides of one axis cut it; the part beyond sides of

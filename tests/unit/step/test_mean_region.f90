@@ -176,6 +176,11 @@ contains
     call check_close(ball_share(grid, [1.0_dp, 0.4_dp], 0.1_dp, 1), 0.5_dp, rounding, "a disk at the end, first bin")
     call check_close(ball_share(grid, [0.9_dp, 0.4_dp], 0.3_dp), 1.0_dp, rounding, "all bins have all of it")
     call check_equal(grid%bin_of([-0.1_dp, 0.4_dp]), 4, "a point before the cell")
+    ! 0.7 less a period is below -0.3 by rounding
+    binned%lower(1) = -0.3_dp
+    binned%upper(1) = 0.2_dp
+    grid = grid_of(binned, 2, 1.0_dp)
+    call check(grid%bin_of([0.7_dp, 0.4_dp]) > 0, "a point on the lower side, a period on")
   end subroutine test_periods
 
   !> Lower sides belong to a bin.
