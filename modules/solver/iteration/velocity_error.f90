@@ -14,7 +14,7 @@
 !> roll or be in error: E has to be at most a third of what moves there. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
-  use gravier_body_mass, only: inverse_of_translation
+  use gravier_body_mass, only: inverse_of_translation, are_uneven
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_levels, only: levels_t
@@ -31,8 +31,6 @@ module gravier_velocity_error
   real(dp), parameter :: violations_allowed = 5.0_dp
   !> times the error allowed by which a body may sink, and by which bodies may on average, each counting the same
   real(dp), parameter :: body_allowed = 5.0_dp, bodies_allowed = 1.0_dp
-  !> fraction of the bodies that have as much mass as all, were they as heavy as the mean of the mass, below which masses are uneven
-  real(dp), parameter :: even_share = 0.25_dp
   !> times the error allowed by which what lies above a level may sink where what moves is at most so many times the error allowed
   real(dp), parameter :: sinking_allowed = 0.25_dp, nearly_at_rest = 3.0_dp
   !> times the error allowed above which a body counts as moving among bodies that are nearly at rest; least share of the error
@@ -139,7 +137,7 @@ contains
     end do
     call problem%comm%sum_parts(parts, sums)
     self%mass = merge(sums(1), sums(2), sums(1) > 0.0_dp)
-    self%is_uneven = sums(1)**2 < even_share*sums(3)*sums(4)
+    self%is_uneven = are_uneven(sums(4), sums(1), sums(3))
     problem%rest_is_admissible = .not. problem%comm%any_true(moves)
   end subroutine velocity_error_start
 

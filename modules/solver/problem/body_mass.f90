@@ -12,11 +12,21 @@ module gravier_body_mass
   private
   public :: can_move, inverse_of_translation, mass_column, multiply_mass, mass_product, multiply_symmetric, invert_symmetric
   public :: add_inverse_mass, subtract_inverse_mass, apply_inverse_mass, velocities_under, inverse_product, inverse_products
+  public :: are_uneven
 
   !> rows of a column with a symmetric matrix
   integer, parameter :: full = 9
+  !> fraction of the bodies that have as much mass as all, were they as heavy as the mean of the mass, below which masses are uneven
+  real(dp), parameter :: even_share = 0.25_dp
 
 contains
+
+  !> Whether few heavy bodies have most of the mass, by the number of bodies, their mass and the sum of their squared masses.
+  pure logical function are_uneven(number, mass, squares)
+    !> [kg], [kg^2]
+    real(dp), intent(in) :: number, mass, squares
+    are_uneven = mass**2 < even_share*number*squares
+  end function are_uneven
 
   !> Whether component `d` of the velocity of a body can change.
   pure logical function can_move(inverse, d)

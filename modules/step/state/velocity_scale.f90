@@ -22,7 +22,7 @@ module gravier_velocity_scale
   use gravier_periodic, only: gradient_times
   use gravier_communicator, only: communicator_t
   use gravier_motion, only: grain_volume
-  use gravier_body_mass, only: mass_product
+  use gravier_body_mass, only: mass_product, are_uneven
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_boundary_levers, only: find_levers
@@ -49,9 +49,6 @@ module gravier_velocity_scale
   real(dp), parameter :: share_of_bonds = 0.2_dp
   !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
-  !> fraction of the grains in contact that have as much mass as all, were they as heavy as the mean by mass, below which masses are
-  !> uneven
-  real(dp), parameter :: even_share = 0.25_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
 
@@ -306,7 +303,7 @@ contains
     integer :: s, b
 
     moves = self%kind == of_motion .or. self%kind == of_bonds
-    is_uneven = masses(2)**2 < even_share*masses(1)*masses(3)
+    is_uneven = are_uneven(masses(1), masses(2), masses(3))
     mean = masses(2)/max(masses(1), 1.0_dp)
     limit = slow_part*self%value
     least = merge(self%quiet, least_own*self%value, self%quiet > 0.0_dp)

@@ -3,7 +3,7 @@ program test_body_mass
   use gravier_kinds, only: dp
   use gravier_body_mass, only: can_move, inverse_of_translation, mass_column, multiply_mass, mass_product, add_inverse_mass, &
     & subtract_inverse_mass, multiply_symmetric, invert_symmetric, apply_inverse_mass, velocities_under, inverse_product, &
-    & inverse_products
+    & inverse_products, are_uneven
   use gravier_check, only: check, check_close, finish_checks
   implicit none
 
@@ -19,6 +19,8 @@ program test_body_mass
   call test_products()
   call test_all_bodies()
   call test_stone()
+  call check(are_uneven(11.0_dp, 110.0_dp, 1.001e4_dp), "one body of 100 kg beside ten of 1 kg")
+  call check(.not. are_uneven(11.0_dp, 110.0_dp, 1.1e3_dp), "eleven of 10 kg")
   call finish_checks()
 
 contains
