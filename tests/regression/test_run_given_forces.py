@@ -227,6 +227,12 @@ class GivenForces(RunTestCase):
             given = self.here(title + ".h5")
             package.write_bodies(read, given)
             np.testing.assert_array_equal(package.BodiesFile(given).period, [0.13, 0.0])
+        # results of an earlier version have that of the input
+        with h5py.File(first.path("results", "results.h5"), "r+") as file:
+            for name in ("period_x", "origin_x"):
+                del file["run"].attrs[name]
+        read = package.Run(first.path("results"))
+        np.testing.assert_array_equal([read.period, read.origin], [[0.13, 0.0], [-0.02, 0.0]])
 
     def test_states_of_results(self):
         """gravier.write_bodies makes of the last state in results.h5, whose numbers have single precision or more, what final_bodies.h5

@@ -119,6 +119,9 @@ class Run:
             self.steps = np.array(sorted(int(name) for name in file["steps"]), dtype=int)
             self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
             self.case = parse_namelist(self.input_text)
+            if not any(name.startswith("period_") for name in what):
+                # an earlier version wrote no period: that of the input
+                self.period, self.origin = (entries(self.case.get("scene", [{}])[0], name, np.zeros(self.dimension)) for name in ("period", "period_origin"))
 
     @contextmanager
     def _open(self):
