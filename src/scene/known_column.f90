@@ -9,21 +9,21 @@ module gravier_known_column
 contains
 
   !> What a case has that impulses of a column do not know, as "where ...", but for a gravity that is not along the column; empty
-  !> where there is nothing.
+  !> where there is nothing. Of several things the last one counts.
   pure function what_else_acts(config) result(words)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: words
     integer :: b
 
     words = ""
-    if (size(config%insertions) > 0) words = "where grains enter"
-    if (size(config%laws) > 0) words = "where there is a &law"
-    if (config%scene%gravity_table /= "" .or. any(abs(config%scene%body_force) > 0.0_dp)) &
-      & words = "where a gravity_table or a body_force acts"
     do b = 1, size(config%boundaries)
       if (.not. is_ground_at_rest(config%boundaries(b))) words = "where there is a boundary beside the ground, or the ground "// &
         & "moves or goes away"
     end do
+    if (config%scene%gravity_table /= "" .or. any(abs(config%scene%body_force) > 0.0_dp)) &
+      & words = "where a gravity_table or a body_force acts"
+    if (size(config%laws) > 0) words = "where there is a &law"
+    if (size(config%insertions) > 0) words = "where grains enter"
   end function what_else_acts
 
   !> Whether a boundary names the ground of the column, and leaves it where it is.
