@@ -8,8 +8,8 @@ module gravier_known_column
 
 contains
 
-  !> What a case has that impulses of a column do not know, as "where ...", but for a gravity that is not along the column; empty
-  !> where there is nothing. Of several things the last one counts.
+  !> What acts on the column of a case beside gravity, in words that begin with "where"; empty where nothing does. Of several things
+  !> the function names one. It does not look at the direction of gravity.
   pure function what_else_acts(config) result(words)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: words

@@ -37,23 +37,18 @@ contains
     call check_origin(path, hdf5_mark, "an HDF5 file", error)
   end subroutine check_hdf5_place
 
-  !> Whether a run may replace what has the name of one of its files: nothing, what is empty, and what begins as such a file does,
-  !> by the ending of the name. Not collective.
+  !> Whether a run may replace what has the name of one of its files. The ending of the name says how a file of the program begins.
+  !> Not collective.
   logical function may_replace(path)
     character(len=*), intent(in) :: path
-    logical :: exists
 
-    inquire (file=path, exist=exists)
-    may_replace = .true.
-    if (.not. exists) return
-    if (file_length(path) == 0) return
     select case (path(index(path, ".", back=.true.):))
     case (".csv")
-      may_replace = begins_with(path, "step,")
+      may_replace = is_own(path, "step,")
     case (".log")
-      may_replace = begins_with(path, "Gravier ")
+      may_replace = is_own(path, "Gravier ")
     case default
-      may_replace = begins_with(path, hdf5_mark)
+      may_replace = is_own(path, hdf5_mark)
     end select
   end function may_replace
 
@@ -61,18 +56,24 @@ contains
   subroutine check_origin(path, beginning, kind, error)
     character(len=*), intent(in) :: path, beginning, kind
     type(error_t), allocatable, intent(inout) :: error
-    logical :: exists
 
     if (allocated(error)) return
-    inquire (file=path, exist=exists)
-    if (.not. exists) return
-    if (.not. is_directory(path)) then
-      if (file_length(path) == 0) return
-      if (begins_with(path, beginning)) return
-    end if
+    if (is_own(path, beginning)) return
     call raise(error, status_input, path//": there is something else, which is not replaced; expected the name of no file, or "// &
       & "of "//kind)
   end subroutine check_origin
+
+  !> Whether a path has nothing, an empty file, or a file that begins with these bytes; a directory is none of them.
+  logical function is_own(path, beginning)
+    character(len=*), intent(in) :: path, beginning
+
+    inquire (file=path, exist=is_own)
+    is_own = .not. is_own
+    if (is_own) return
+    if (is_directory(path)) return
+    is_own = file_length(path) == 0
+    if (.not. is_own) is_own = begins_with(path, beginning)
+  end function is_own
 
   !> Whether a file can be read and begins with these bytes. Not collective.
   logical function begins_with(path, beginning) result(begins)
