@@ -58,21 +58,21 @@ contains
     end associate
     self%stage = of_each_step
     self%schedule = schedule_t(every=1)
-    call open_table(self%table, directory//"history.csv", history_header(simulation), simulation, error)
+    call open_table(self%table, directory, "history.csv", history_header(simulation), simulation, error)
   end subroutine history_output_open
 
   !> Begin a table, or go on with it behind the step of the simulation. Rank 0 writes, and may fail.
-  subroutine open_table(table, path, header, simulation, error)
+  subroutine open_table(table, directory, name, header, simulation, error)
     type(csv_writer_t), intent(inout) :: table
-    character(len=*), intent(in) :: path, header
+    character(len=*), intent(in) :: directory, name, header
     type(simulation_t), intent(in) :: simulation
     type(error_t), allocatable, intent(inout) :: error
 
     if (simulation%comm%rank /= 0) return
-    if (simulation%restarted) then
-      call table%resume(path, header, simulation%step, error, column_options)
+    if (simulation%goes_on_with(name)) then
+      call table%resume(directory//name, header, simulation%step, error, column_options)
     else
-      call table%open(path, header, error)
+      call table%open(directory//name, header, error)
     end if
   end subroutine open_table
 

@@ -11,7 +11,7 @@ module gravier_output_files
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
   private
-  public :: check_paths, refuse_directory, older_files
+  public :: check_paths, refuse_directory, older_files, own_files
 
   !> of every run
   character(len=*), parameter :: log_name = "run.log"
@@ -19,13 +19,11 @@ module gravier_output_files
 contains
 
   !> Refuse an output directory that cannot be written to, an output whose place a directory has, an input that the run would
-  !> replace by an output and, where a run begins, a file of another origin that it would replace. Rank 0 looks and writes nothing.
+  !> replace by an output, and a file of another origin in the place of an output. Rank 0 looks and writes nothing.
   !> Failure: status_input, with the key. Collective.
-  subroutine check_paths(comm, config, begins, error)
+  subroutine check_paths(comm, config, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
-    !> the run is none that goes on, which tells its files by what they hold
-    logical, intent(in) :: begins
     type(error_t), allocatable, intent(inout) :: error
     type(error_t), allocatable :: reason
     character(len=:), allocatable :: names
@@ -35,12 +33,13 @@ contains
     if (comm%rank == 0) then
       call check_directory(trim(config%output%directory), reason)
       if (allocated(reason)) call refuse_directory(config, reason, error)
-      names = file_names(config, wanted=.true.)
+      names = own_files(config)
       call check_outputs(config, names, error)
       call check_input(config%file, "the case itself")
       if (config%scene%bodies == "file") call check_input(config%scene%bodies_file, "&scene bodies_file")
       call check_input(config%scene%shapes, "&scene shapes")
       call check_input(config%scene%gravity_table, "&scene gravity_table")
+      call check_input(config%sample%radius_table, "&sample radius_table")
       do b = 1, size(config%boundaries)
         call check_input(config%boundaries(b)%table, "&boundary '"//trim(config%boundaries(b)%name)//"' table")
         call check_input(config%boundaries(b)%file, "&boundary '"//trim(config%boundaries(b)%name)//"' file")
@@ -48,7 +47,7 @@ contains
       do b = 1, size(config%insertions)
         call check_input(config%insertions(b)%radius_table, "&insertion '"//trim(config%insertions(b)%name)//"' radius_table")
       end do
-      if (begins) call check_origins(config, names, error)
+      call check_origins(config, names, error)
     end if
     call comm%agree(error)
 
@@ -137,11 +136,11 @@ contains
     logical :: exists
 
     found = ""
-    own = ","//file_names(config, wanted=.true.)//","
+    own = ","//own_files(config)//","
     ! an output of this run may write fewer files than that of the older one
     all_asked = config
     all_asked%output%contacts = .true.
-    names = file_names(all_asked, wanted=.true.)//","//file_names(all_asked, wanted=.false.)
+    names = own_files(all_asked)//","//file_names(all_asked, wanted=.false.)
     first = 1
     do
       call take_name(names, first, name)
@@ -167,6 +166,14 @@ contains
     first = first + len(name) + 1
   end subroutine take_name
 
+  !> Names of the files that a run writes, with commas between.
+  function own_files(config) result(names)
+    type(config_t), intent(in) :: config
+    character(len=:), allocatable :: names
+
+    names = log_name//","//file_names(config, wanted=.true.)
+  end function own_files
+
   !> Names of the files of the outputs that the input wants, or does not want, with commas between.
   function file_names(config, wanted) result(names)
     type(config_t), intent(in) :: config
@@ -176,14 +183,13 @@ contains
     integer :: k
 
     names = ""
-    if (wanted) names = log_name
     call registered_outputs(all_kinds)
     do k = 1, size(all_kinds)
       associate (item => all_kinds(k)%output)
         if ((item%wanted(config) .eqv. wanted) .and. item%files(config) /= "") names = names//","//item%files(config)
       end associate
     end do
-    if (.not. wanted) names = names(2:)
+    names = names(2:)
   end function file_names
 
 end module gravier_output_files

@@ -71,37 +71,37 @@ contains
       if (output%every > 0) states = states + simulation%config%time%steps/output%every
       bodies = max(simulation%n_grains, 1_i8)
       call draw_bodies(simulation, table)
-      call open_one(self%bodies, simulation, directory//bodies_name, table, states*bodies, error)
+      call open_one(self%bodies, simulation, directory, bodies_name, table, states*bodies, error)
       ! a run that ended in the step of its checkpoint has written this state
       if (self%bodies%has_last) self%last = simulation%step
       if (has_facets(simulation%decomposition%boundaries)) then
         call draw_facets(simulation, table)
-        self%facets_due = facets_move(simulation) .or. .not. simulation%restarted
-        call open_one(self%facets, simulation, directory//facets_name, table, merge(states, 1_i8, facets_move(simulation))* &
+        self%facets_due = facets_move(simulation) .or. .not. simulation%goes_on_with(facets_name)
+        call open_one(self%facets, simulation, directory, facets_name, table, merge(states, 1_i8, facets_move(simulation))* &
           & count_facets(simulation%decomposition%boundaries, .false.), error)
       end if
       if (.not. output%contacts) return
       ! a dense packing has about two contacts a disk, three a sphere
       call describe_contacts(table)
-      call open_one(self%contacts, simulation, directory//contacts_name, table, states*bodies*simulation%decomposition%nd, error)
+      call open_one(self%contacts, simulation, directory, contacts_name, table, states*bodies*simulation%decomposition%nd, error)
     end associate
   end subroutine picture_output_open
 
   !> Create a file, or go on with it.
-  subroutine open_one(file, simulation, path, table, expected, error)
+  subroutine open_one(file, simulation, directory, name, table, expected, error)
     type(vtkhdf_file_t), intent(inout) :: file
     type(simulation_t), intent(in) :: simulation
-    character(len=*), intent(in) :: path
+    character(len=*), intent(in) :: directory, name
     !> with the fields of the file
     type(field_list_t), intent(in) :: table
     !> rows of all states together, about
     integer(i8), intent(in) :: expected
     type(error_t), allocatable, intent(inout) :: error
 
-    if (simulation%restarted) then
-      call file%reopen(simulation%comm, path, table, expected, simulation%step, error)
+    if (simulation%goes_on_with(name)) then
+      call file%reopen(simulation%comm, directory//name, table, expected, simulation%step, error)
     else
-      call file%open(simulation%comm, path, table, expected, error)
+      call file%open(simulation%comm, directory//name, table, expected, error)
     end if
   end subroutine open_one
 

@@ -56,7 +56,7 @@ contains
     self%has_error = simulation%config%solver%criterion == "error"
     header = "step,iteration,residual,velocity_error,jump"
     if (self%has_error) header = header//",error"
-    call open_table(self%table, directory//"trace.csv", header, simulation, error)
+    call open_table(self%table, directory, "trace.csv", header, simulation, error)
   end subroutine trace_output_open
 
   !> Write the rows of a step, on rank 0.

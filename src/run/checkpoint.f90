@@ -53,7 +53,7 @@ contains
       end associate
     end do
     text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
-    text = text//"partition: "//head_record//", "//to_text(head_words)//" words"
+    text = text//"files: names"//newline//"partition: "//head_record//", "//to_text(head_words)//" words"
   end function records_text
 
   !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
@@ -68,6 +68,7 @@ contains
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
     call file%write_text("scene", fixed_options(simulation), error)
+    call file%write_text("files", simulation%files, error)
     call file%write_scalar("subdomains", int(simulation%decomposition%n_subdomains, i8), error)
     call file%write_scalar("time_step", simulation%physics%h, error)
     call file%write_scalar("theta", simulation%config%time%theta, error)
@@ -144,6 +145,7 @@ contains
     call check_scene(simulation, file, path, error)
     call file%read_scalar("step", step, error)
     call check_steps(simulation, step, path, error)
+    call file%read_text("files", simulation%files, error)
     call file%read_scalar("time", simulation%time, error)
     call file%read_scalar("grains", simulation%n_grains, error)
     call file%read_scalar("glued", simulation%n_glued, error)

@@ -26,7 +26,7 @@ module gravier_open_run
   use gravier_accuracy_lines, only: goal_name
   use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
-  use gravier_output_files, only: check_paths, refuse_directory, older_files
+  use gravier_output_files, only: check_paths, refuse_directory, older_files, own_files
   use gravier_run_end, only: has_ended, end_line
   implicit none
   private
@@ -98,7 +98,7 @@ contains
     call reset_timers()
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
-    call check_paths(comm, config, .not. restart, error)
+    call check_paths(comm, config, error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
@@ -114,6 +114,7 @@ contains
     ! files of an older run may be refused, before the log says anything
     call self%output%open(self%simulation, command, error)
     if (allocated(error)) return
+    call self%simulation%note_files(own_files(config))
     call write_beginning(self%simulation, self%log, restart, self%lock%unknown, older, error)
     if (allocated(error)) return
     self%is_open = .true.

@@ -60,7 +60,7 @@ contains
 
     call log%init(comm)
     call read_config(comm, path, config, error)
-    call check_paths(comm, config, .true., error)
+    call check_paths(comm, config, error)
     libraries = peak_memory()
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     call check_start_overlap(simulation, error)

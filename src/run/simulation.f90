@@ -57,13 +57,16 @@ module gravier_simulation
     integer :: last_written = -1
     !> the state comes from a checkpoint
     logical :: restarted = .false.
-
-contains
+    !> names of the files that the run has, those before a restart among them, with commas between
+    character(len=:), allocatable :: files
+  contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
     procedure :: start => simulation_start
     procedure :: make_subdomains => simulation_make_subdomains
     procedure :: start_diagnostics => simulation_start_diagnostics
+    procedure :: note_files => simulation_note_files
+    procedure :: goes_on_with => simulation_goes_on_with
     procedure :: free => simulation_free
   end type simulation_t
 
@@ -314,6 +317,31 @@ contains
     if (allocated(self%decomposition%entry_box)) deallocate (self%decomposition%entry_box)
     self%last_written = -1
     self%restarted = .false.
+    self%files = ""
   end subroutine simulation_free
+
+  !> Remember the files that the run has from now on, beside those that it had before a restart.
+  pure subroutine simulation_note_files(self, names)
+    class(simulation_t), intent(inout) :: self
+    !> with commas between
+    character(len=*), intent(in) :: names
+    integer :: first, last
+
+    first = 1
+    do while (first <= len(names))
+      last = first + index(names(first:)//",", ",") - 2
+      if (index(","//self%files//",", ","//names(first:last)//",") == 0) self%files = self%files//","//names(first:last)
+      first = last + 2
+    end do
+    if (index(self%files, ",") == 1) self%files = self%files(2:)
+  end subroutine simulation_note_files
+
+  !> Whether the run that is restarted has written a file of this name before; one that it has not written is of another run.
+  pure logical function simulation_goes_on_with(self, name) result(goes_on)
+    class(simulation_t), intent(in) :: self
+    character(len=*), intent(in) :: name
+
+    goes_on = self%restarted .and. index(","//self%files//",", ","//name//",") > 0
+  end function simulation_goes_on_with
 
 end module gravier_simulation

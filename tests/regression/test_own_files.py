@@ -107,14 +107,46 @@ class OwnFiles(RunTestCase):
             self.assert_status(run_case(case, directory=self.work), 0)
             write(path, "time,mine\n1,2\n")
             before = self.files()
-            run = run_case(case, directory=self.work)
-            self.assert_status(run, 2)
-            self.assertIn(f"case.nml: &output directory = 'results': the file {name} in it is none of this program, and is not replaced; expected "
-                          "another directory, or another name for that file", str(run))
-            self.assertEqual(self.files(), before)
+            for options in ((), ("--restart",)):  # there is no checkpoint: a restart begins anew
+                run = run_case(case, directory=self.work, options=options)
+                self.assert_status(run, 2)
+                self.assertIn(f"case.nml: &output directory = 'results': the file {name} in it is none of this program, and is not replaced; expected "
+                              "another directory, or another name for that file", str(run))
+                self.assertEqual(self.files(), before)
             with open(path, "wb") as file:
                 file.write(own)
         self.assert_status(run_case(case, directory=self.work), 0)
+
+    def test_input_in_place_of_an_output(self):
+        """A table of radii that has the name of an output is read, and not replaced."""
+        table = write(os.path.join(self.work, "results", "history.csv"), "radius,share\n0.008,0\n0.012,1\n")
+        case = merged(CASE, {"sample": {"count": 20, "box": [0.3, 0.0], "radii": "table", "radius_table": "results/history.csv"}})
+        case["scene"] = {"dimension": 2, "bodies": "sample"}
+        for options in ((), ("--restart",)):
+            run = run_case(case, directory=self.work, options=options)
+            self.assert_status(run, 2)
+            self.assertIn("case.nml: &sample radius_table = 'results/history.csv': this run would replace the file by its own history.csv", str(run))
+            with open(table, encoding="utf-8") as file:
+                self.assertEqual(file.read(), "radius,share\n0.008,0\n0.012,1\n")
+
+    def test_files_of_another_run(self):
+        """A restart goes on with the files that its run has written. Those of an older run, in the place of outputs that it had not asked for
+        until then, begin anew."""
+        output = {"directory": "results", "every": 5, "vtk": True, "trace": True}
+        case = merged(CASE, {"output": output})
+        shutil.rmtree(os.path.join(self.work, "results"))
+        self.assert_status(run_case(case, directory=self.work), 0)
+        other = merged(CASE, {"scene": {"lattice_count": [5, 3]}, "output": {"vtk": False, "trace": False, "every": 5, "checkpoint_every": 10}})
+        self.assert_status(run_case(other, directory=self.work), 0)
+        for steps, first in ((30, 20), (40, 20)):
+            longer = merged(other, {"time": {"steps": steps}, "output": output})
+            self.assert_status(run_case(longer, directory=self.work, options=("--restart",)), 0)
+            with h5py.File(os.path.join(self.work, "results", "bodies.vtkhdf"), "r") as file:
+                self.assertEqual(set(file["VTKHDF/NumberOfPoints"][:]), {15})
+                self.assertEqual([round(1000*time) for time in file["VTKHDF/Steps/Values"]], list(range(first + 5, steps + 1, 5)))
+            with open(os.path.join(self.work, "results", "trace.csv"), encoding="utf-8") as file:
+                found = {int(line.split(",")[0]) for line in file.readlines()[1:]}
+            self.assertEqual(found, set(range(first + 1, steps + 1)))
 
     def test_functions_of_the_package(self):
         """The same by exceptions: bodies files, cases, seals of tables and blocks."""

@@ -293,7 +293,7 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     integer(i8), allocatable :: records(:, :), received(:, :)
     type(body_layout_t) :: layout
-    integer :: s, k, n
+    integer :: s, k, n, r
 
     layout = decomposition%layout()
     allocate (records(layout%renewed_words(), size(self%recipient)))
@@ -307,10 +307,13 @@ contains
     do s = 1, size(self%view)
       associate (view => self%view(s), owned => decomposition%owned(s))
         if (decomposition%period%moves) view%period = decomposition%period
-        do k = 1, view%bodies%n
-          if (view%origin(k) == 0) cycle
-          call view%bodies%renew(k, owned, view%origin(k))
+        if (owned%awake%have_all(owned%n)) call view%bodies%awake%take_all(view%bodies%n)
+        do r = 1, view%bodies%awake%n
+          do k = view%bodies%awake%first(r), view%bodies%awake%last(r)
+            if (view%origin(k) > 0) call view%bodies%renew(k, owned, view%origin(k))
+          end do
         end do
+        if (owned%nr > 0) call view%bodies%awake%leave_out(view%bodies%wakes_at)
       end associate
     end do
   end subroutine halo_refresh

@@ -4,31 +4,53 @@ module gravier_load_areas
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_facing_planes, only: find_facing_planes, is_pressed
   use gravier_decomposition, only: decomposition_t
+  use gravier_scene_extent, only: find_extent
   implicit none
   private
   public :: facing_area, find_load_areas, check_load_areas
 
 contains
 
-  !> Area that a pressure on plane `b` works on, that of the plane itself where it leans [m^2, m in 2D]; 0 for another boundary.
+  !> Area that a pressure on plane `b` works on, that of the plane itself where it leans [m^2, m in 2D]; 0 for another boundary, and
+  !> where the scene is open across the load: no pressure works there (check_load_areas).
   pure real(dp) function facing_area(decomposition, b) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: b
+    real(dp), parameter :: open_axis(3) = 0.0_dp
+
+    area = 0.0_dp
+    if (decomposition%boundaries(b)%is_plane()) area = load_area(decomposition, b, open_axis)
+  end function facing_area
+
+  !> Area that a load on boundary `b` works on: of a plane that of a pressure, of a segment or rectangle its own, of another shape
+  !> that of the scene across the load [m^2, m in 2D].
+  pure real(dp) function load_area(decomposition, b, extent) result(area)
+    type(decomposition_t), intent(in) :: decomposition
+    integer, intent(in) :: b
+    !> lengths of the scene along axes without a period and without two planes that face each other [m]
+    real(dp), intent(in) :: extent(:)
+    real(dp) :: place(3)
 
     area = 0.0_dp
     associate (boundary => decomposition%boundaries(b))
-      if (boundary%is_plane()) area = area_across(decomposition, boundary%load_axis(), boundary%surface%point)/ &
-        & abs(boundary%surface%axis(boundary%load_axis()))
+      place(:) = boundary%pivot
+      if (allocated(boundary%surface)) then
+        area = boundary%surface%own_area()
+        place(:) = boundary%surface%point
+      end if
+      if (area > 0.0_dp) return
+      area = area_across(decomposition, boundary%load_axis(), place, extent)
+      if (boundary%is_plane()) area = area/abs(boundary%surface%axis(boundary%load_axis()))
     end associate
-  end function facing_area
+  end function load_area
 
-  !> Area of the scene across axis `main` at a place: along every other axis, the way between the two planes that face each other
-  !> across it, or the period [m^2, m in 2D]. An axis without either counts 1 m: no pressure works there (check_load_areas).
-  pure real(dp) function area_across(decomposition, main, place) result(area)
+  !> Area of the scene across axis `main` at a place: along every other axis the period, the way between the two planes that face
+  !> each other across it, or what is given for an open axis [m^2, m in 2D].
+  pure real(dp) function area_across(decomposition, main, place, extent) result(area)
     type(decomposition_t), intent(in) :: decomposition
     integer, intent(in) :: main
     !> [m]
-    real(dp), intent(in) :: place(3)
+    real(dp), intent(in) :: place(3), extent(:)
     real(dp) :: low, high
     integer :: d
 
@@ -41,32 +63,33 @@ contains
           area = area*length(d)
         else if (low > -huge(1.0_dp) .and. high < huge(1.0_dp)) then
           area = area*max(high - low, 0.0_dp)
+        else
+          area = area*extent(d)
         end if
       end do
     end associate
   end function area_across
 
-  !> Areas that the loads on boundaries work on: of a plane that of its pressure, of a segment or rectangle its own, of another
-  !> shape that of the scene across its load.
-  pure subroutine find_load_areas(decomposition, area)
+  !> Areas that the loads on boundaries work on. Where a scene is open across a load, or shut in by other boundaries than planes,
+  !> its grains tell how far it goes: at least as far as the load works. Collective.
+  subroutine find_load_areas(decomposition, area)
     type(decomposition_t), intent(in) :: decomposition
-    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary
+    !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary, and where there is no grain
     real(dp), intent(out) :: area(:)
-    real(dp) :: place(3)
+    real(dp), dimension(decomposition%nd) :: low, high, extent
     integer :: b
+    logical :: known
 
     area(:) = 0.0_dp
+    extent(:) = 0.0_dp
+    known = .false.
     do b = 1, size(area)
-      associate (boundary => decomposition%boundaries(b))
-        if (.not. boundary%is_driven()) cycle
-        area(b) = facing_area(decomposition, b)
-        if (area(b) > 0.0_dp) cycle
-        if (allocated(boundary%surface)) area(b) = boundary%surface%own_area()
-        if (area(b) > 0.0_dp) cycle
-        place(:) = boundary%pivot
-        if (allocated(boundary%surface)) place(:) = boundary%surface%point
-        area(b) = area_across(decomposition, boundary%load_axis(), place)
-      end associate
+      if (.not. decomposition%boundaries(b)%is_driven()) cycle
+      area(b) = load_area(decomposition, b, extent)
+      if (area(b) > 0.0_dp .or. known) cycle
+      call find_extent(decomposition, low, high, extent)
+      known = .true.
+      area(b) = load_area(decomposition, b, extent)
     end do
   end subroutine find_load_areas
 

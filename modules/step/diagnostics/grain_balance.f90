@@ -131,7 +131,7 @@ contains
     self%flux(:) = sums(in_flux + 1:in_flux + 3)
   end subroutine keep_motion
 
-  !> Sums over the free grains that are owned by a subdomain.
+  !> Sums over the free grains that are owned by a subdomain; those that sleep have no part in them.
   pure subroutine add_grains(figures, bodies, physics, part, origin)
     type(body_figures_t), intent(in) :: figures
     type(body_set_t), intent(in) :: bodies
@@ -139,14 +139,16 @@ contains
     real(dp), intent(inout) :: part(n_sums)
     !> of a view: its grains with 0 are ghosts (n)
     integer, intent(in), optional :: origin(:)
-    integer :: k
+    integer :: k, r
 
-    do k = 1, bodies%n
-      if (bodies%glued(k) > 0) cycle
-      if (present(origin)) then
-        if (origin(k) == 0) cycle
-      end if
-      call add_grain(figures, bodies, k, physics, part)
+    do r = 1, bodies%awake%n
+      do k = bodies%awake%first(r), bodies%awake%last(r)
+        if (bodies%glued(k) > 0) cycle
+        if (present(origin)) then
+          if (origin(k) == 0) cycle
+        end if
+        call add_grain(figures, bodies, k, physics, part)
+      end do
     end do
   end subroutine add_grains
 

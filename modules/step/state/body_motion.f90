@@ -29,16 +29,18 @@ contains
     !> whether a boundary was taken away
     logical, intent(out) :: taken_away
     real(dp) :: part
-    integer :: s, b, k, nd
+    integer :: s, b, k, r, nd
 
     taken_away = .false.
     nd = decomposition%nd
     part = (1.0_dp - theta)*physics%h
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          if (owned%glued(k) == 0) owned%position(:, k) = predict_position(owned%position(:, k), owned%velocity(1:nd, k), &
-            & physics%h, theta)
+        do r = 1, owned%awake%n
+          do k = owned%awake%first(r), owned%awake%last(r)
+            if (owned%glued(k) == 0) owned%position(:, k) = predict_position(owned%position(:, k), owned%velocity(1:nd, k), &
+              & physics%h, theta)
+          end do
         end do
         if (owned%no > 0) call turn_bodies(owned, part)
       end associate
@@ -60,10 +62,12 @@ contains
     type(body_set_t), intent(inout) :: bodies
     !> [s]
     real(dp), intent(in) :: duration
-    integer :: k
+    integer :: k, r
 
-    do k = 1, bodies%n
-      if (bodies%glued(k) == 0) call turn_orientation(bodies%orientation(:, k), bodies%velocity(bodies%nd + 1:, k), duration)
+    do r = 1, bodies%awake%n
+      do k = bodies%awake%first(r), bodies%awake%last(r)
+        if (bodies%glued(k) == 0) call turn_orientation(bodies%orientation(:, k), bodies%velocity(bodies%nd + 1:, k), duration)
+      end do
     end do
   end subroutine turn_bodies
 
@@ -109,14 +113,16 @@ contains
     type(physics_t), intent(in) :: physics
     real(dp), intent(in) :: theta
     logical, intent(in) :: some_glued
-    integer :: s, b, k, nd
+    integer :: s, b, k, r, nd
 
     nd = decomposition%nd
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          if (owned%glued(k) == 0) owned%position(:, k) = advance_position(owned%position(:, k), owned%velocity(1:nd, k), &
-            & physics%h, theta)
+        do r = 1, owned%awake%n
+          do k = owned%awake%first(r), owned%awake%last(r)
+            if (owned%glued(k) == 0) owned%position(:, k) = advance_position(owned%position(:, k), owned%velocity(1:nd, k), &
+              & physics%h, theta)
+          end do
         end do
         if (owned%no > 0) call turn_bodies(owned, theta*physics%h)
       end associate

@@ -178,8 +178,9 @@ contains
     do s = 1, size(borne)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (owned%sleeps(k)) owned%held(1:problem%kernels%nv, k) = owned%held(1:problem%kernels%nv, k) + &
-            & (2*mark - 1)*borne(s)%on(:, k)
+          if (.not. owned%sleeps(k) .or. .not. any(abs(borne(s)%on(:, k)) > 0.0_dp)) cycle
+          owned%held(1:problem%kernels%nv, k) = owned%held(1:problem%kernels%nv, k) + (2*mark - 1)*borne(s)%on(:, k)
+          owned%steady(k) = .false.
         end do
       end associate
     end do

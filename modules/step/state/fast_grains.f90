@@ -3,6 +3,7 @@ module gravier_fast_grains
   use gravier_kinds, only: dp, i8
   use gravier_periodic, only: gradient_times
   use gravier_facet, only: near_facets_t, find_facet_normal
+  use gravier_stretches, only: stretches_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_decomposition, only: decomposition_t
@@ -25,8 +26,9 @@ contains
     type(near_facets_t) :: near
     integer(i8) :: counts(1)
     real(dp) :: gradient(3, 3), centre(3), v(decomposition%nd), place(decomposition%nd), carried(decomposition%nd), half
+    type(stretches_t) :: looked_at
     integer, allocatable :: quick(:)
-    integer :: s, k, b, nd
+    integer :: s, k, b, r, nd
     logical :: is_fast
 
     nd = decomposition%nd
@@ -37,20 +39,25 @@ contains
     counts(:) = 0
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          v(:) = owned%velocity(1:nd, k)
-          if (decomposition%period%moves) then
-            place(:) = owned%position(:, k) - centre(1:nd)
-            carried(:) = gradient_times(gradient, place)
-            v(:) = v - carried
-          end if
-          half = decomposition%figures%half_thickness_of(owned, k)
-          is_fast = physics%h**2*max(sum(v**2), (owned%radius(k) - half)**2*sum(owned%velocity(nd + 1:, k)**2)) > half**2
-          do b = 1, size(quick)
-            if (is_fast .or. owned%glued(k) > 0) exit
-            is_fast = may_be_passed(owned, k, half, decomposition%boundaries(quick(b)), physics%h, near)
+        looked_at = owned%awake
+        ! a boundary may pass through those that sleep, too
+        if (size(quick) > 0) call looked_at%take_all(owned%n)
+        do r = 1, looked_at%n
+          do k = looked_at%first(r), looked_at%last(r)
+            v(:) = owned%velocity(1:nd, k)
+            if (decomposition%period%moves) then
+              place(:) = owned%position(:, k) - centre(1:nd)
+              carried(:) = gradient_times(gradient, place)
+              v(:) = v - carried
+            end if
+            half = decomposition%figures%half_thickness_of(owned, k)
+            is_fast = physics%h**2*max(sum(v**2), (owned%radius(k) - half)**2*sum(owned%velocity(nd + 1:, k)**2)) > half**2
+            do b = 1, size(quick)
+              if (is_fast .or. owned%glued(k) > 0) exit
+              is_fast = may_be_passed(owned, k, half, decomposition%boundaries(quick(b)), physics%h, near)
+            end do
+            if (is_fast) counts(1) = counts(1) + 1
           end do
-          if (is_fast) counts(1) = counts(1) + 1
         end do
       end associate
     end do

@@ -241,11 +241,15 @@ contains
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer, allocatable :: destination(:)
     logical, allocatable :: sends(:)
-    integer :: s, b, k, h, place, n, round
+    integer :: s, b, k, r, h, place, n, round
 
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        where (.not. owned%wakes_at > 0.0_dp) owned%rest = 0
+        do r = 1, owned%awake%n
+          do k = owned%awake%first(r), owned%awake%last(r)
+            if (.not. owned%wakes_at(k) > 0.0_dp) owned%rest(k) = 0
+          end do
+        end do
       end associate
     end do
     do round = 1, 2
@@ -272,6 +276,11 @@ contains
     do k = 1, size(received, 2)
       call decomposition%find_owned(received(1:2, k), h, place)
       call put(h, place, narrow(received(3, k)), transfer(received(4, k), 0.0_dp))
+    end do
+    ! a cell that moves carries all grains along
+    if (problem%cell%moves) return
+    do s = 1, size(decomposition%owned)
+      call decomposition%owned(s)%awake%leave_out(decomposition%owned(s)%wakes_at)
     end do
 
   contains

@@ -22,13 +22,15 @@ contains
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(in) :: problem
-    integer :: s, k
+    integer :: s, k, r
 
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          if (owned%glued(k) == 0 .and. .not. owned%sleeps(k)) call physics%accelerate(decomposition%figures, owned, k, &
-            & owned%velocity(:, k))
+        do r = 1, owned%awake%n
+          do k = owned%awake%first(r), owned%awake%last(r)
+            if (owned%glued(k) == 0 .and. .not. owned%sleeps(k)) call physics%accelerate(decomposition%figures, owned, k, &
+              & owned%velocity(:, k))
+          end do
         end do
       end associate
     end do

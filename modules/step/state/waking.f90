@@ -150,7 +150,7 @@ contains
     end do
   end subroutine wake_disturbed
 
-  !> Wake the grains of this rank that would get too large a momentum.
+  !> Wake the grains of this rank that would get too large a momentum. Those are asked on which an impulse has changed.
   subroutine wake_moved(decomposition, physics, nw, borne, woken)
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -160,15 +160,21 @@ contains
     type(impulses_t), intent(in) :: borne(:)
     logical, intent(out) :: woken
     integer :: s, k
+    logical :: touched
 
     woken = .false.
     do s = 1, size(borne)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          if (.not. owned%sleeps(k)) cycle
-          if (.not. momentum_under(owned, k, borne(s)%on(:, k)) > owned%wakes_at(k)) cycle
-          call owned%wake(k)
-          woken = .true.
+          touched = any(abs(borne(s)%on(:, k)) > 0.0_dp)
+          if (.not. owned%sleeps(k) .or. (owned%steady(k) .and. .not. touched)) cycle
+          if (momentum_under(owned, k, borne(s)%on(:, k)) > owned%wakes_at(k)) then
+            call owned%wake(k)
+            woken = .true.
+          else
+            ! what touches it now may be gone in the next step
+            owned%steady(k) = .not. touched
+          end if
         end do
       end associate
     end do

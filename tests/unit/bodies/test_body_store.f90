@@ -290,6 +290,9 @@ contains
     call bodies%init(layout, 2)
     call check_equal(layout%saved_words(), others%saved_words() + layout%rest_words(), "words of the rest in a checkpoint")
     call check(bodies%rest(2) == 0 .and. .not. bodies%sleeps(2), "a new body is awake")
+    call check(bodies%awake%have_all(2) .and. size(bodies%steady) == 2 .and. .not. any(bodies%steady), &
+      & "steps go through all of new bodies, and ask each")
+    call check(others%awake%have_all(2) .and. size(others%steady) == 0, "steps go through all where none may sleep")
     bodies%id(:) = [3_i8, 5_i8]
     bodies%radius(:) = 1.0_dp
     bodies%mass(:) = 1.0_dp
@@ -314,7 +317,12 @@ contains
     call bodies%get_renewed(2, renewed)
     call others%set_renewed(2, renewed)
     call check(others%sleeps(2), "its copies know of it")
+    call others%awake%leave_out(others%wakes_at)
+    others%steady(:) = .true.
+    call check_equal(others%awake%n, 0, "steps pass over bodies that sleep")
     call others%wake(2)
+    call check(others%awake%have_all(2), "and go through all from where one wakes")
+    call check(others%steady(1) .and. .not. others%steady(2), "which is asked again when it sleeps")
     call check(.not. others%sleeps(2) .and. others%rest(2) == 0, "a body that wakes counts from the start")
     call others%wake(1)
     call check(.not. any(abs(others%held) > 0.0_dp), "and bears nothing of contacts that are left out")

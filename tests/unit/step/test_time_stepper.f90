@@ -78,6 +78,15 @@ contains
     call check_close(area(3), 4.0_dp, 1e-12_dp, "area of the right side")
     call check_close(area(5), 1.5_dp, 1e-12_dp, "length of the bar")
     call simulation%free()
+    call make_scene(comm, column//"&time step = 0.01, steps = 1 / "// &
+      & "&boundary name = 'lid', shape = 'plane', normal = 0, -1, point = 0, 4, free = F, T, mass = 1.0, force = 0, -5 / "// &
+      & "&boundary name = 'left', shape = 'plane', normal = 1, 0, point = -0.75, 0 / "// &
+      & "&boundary name = 'ring', shape = 'circle', point = 0, 4, radius = 9, free = T, F, mass = 1.0, force = 2, 0 /", simulation)
+    call check_close(facing_area(simulation%decomposition, 2), 0.0_dp, 0.0_dp, "no pressure works where nothing bounds the scene")
+    call find_load_areas(simulation%decomposition, area(1:4))
+    call check_close(area(2), 1.25_dp, 1e-12_dp, "a lid beside one plane works from there to the last grain")
+    call check_close(area(4), 4.0_dp, 1e-12_dp, "another shape works on the way between the planes across its load")
+    call simulation%free()
   end subroutine test_areas
 
   !> q_m = q + (1 - theta) h v, and from there theta h v: h v in all. Boundaries take the velocity of the end of the step.
