@@ -36,8 +36,8 @@ class RunLog:
         return gravier.parse_namelist("\n".join(inside[first:last + 1]))
 
     def warnings(self):
-        """Lines that warn, and what the closing line counts; misses of solves among them."""
-        return [line.strip() for line in self.lines if line.startswith("warning ") or line.lstrip().startswith("***")]
+        """Lines that warn, what the closing line counts, with misses of solves, and what a loop has set in the place of keys."""
+        return [line.strip() for line in self.lines if line.startswith(("warning ", "loop ")) or line.lstrip().startswith("***")]
 
     def phases(self):
         """Name, mean, least and largest time over the ranks [s] and percentage of the run, the dearest first."""

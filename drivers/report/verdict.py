@@ -4,8 +4,9 @@ import re
 import numpy
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
-#: as the last words of the program judge: the fraction of steps with mended overlaps, the velocity error over U
-OFTEN, FAR_OFF = 0.1, 0.5
+#: as the last words of the program judge: the fraction of steps with mended overlaps, the part of the paths of grains below which
+#: shifts are small, the velocity error over U
+OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
 #: the parts of the energy turned over up to which a balance is one, and up to which it is nearly one
 BALANCED, UNBALANCED = 1e-4, 1e-2
 
@@ -74,7 +75,8 @@ def accurate(history, solver):
 
 
 def mended(log, history):
-    """As the log counts projections at its end, which leaves out those that shift by rounding; before that, as history.csv does."""
+    """As the log counts projections at its end, which leaves out those that shift by rounding, and weighs them by the paths of grains; of
+    steps that it does not know, before its end or before a restart, as history.csv counts them."""
     question = "Was the geometry mended?"
     if "projected" not in history or "max_overlap" not in history or len(history) == 0:
         return Answer(question, UNKNOWN, "Not known: no step is recorded.")
@@ -85,16 +87,40 @@ def mended(log, history):
         overlap = f"The largest overlap of rigid contacts was {history.max_overlap.max():.2g} m; {yielding.split(';')[0]}."
     if "overlaps are not projected" in lines:
         return Answer(question, GOOD, f"No: overlaps are not projected in this case. {overlap}")
-    told = next((line for line in lines if line.startswith("projected in ")), None)
-    share = float((history.projected > 0).mean())
-    words = f"projected in {percent(share)} of the steps"
-    if told:
-        part = re.match(r"projected in (\d+) of (\d+) steps", told)
-        share, words = int(part[1]) / max(1, int(part[2])), told
-    if share == 0.0 or "no step projected overlaps" in lines:
+    told = next((line for line in lines if line.startswith("projected in ")), "")
+    found = re.match(r"projected in (\d+) of (\d+) steps", told)
+    if not found and "no step projected overlaps" in lines:
+        found = re.match(r"(\d+) of (\d+)", f"0 of {len(history) if log.restarts == 0 else last_part(log, history)}")
+    share, known = (int(found[1]) / max(1, int(found[2])), int(found[2])) if found else (0.0, 0)
+    small = re.search(r", (\S+) of its path", told)
+    grade = GOOD if share == 0.0 else BAD if share > OFTEN else DOUBT
+    if small and float(small[1]) < LITTLE:
+        grade = DOUBT if share > OFTEN else GOOD
+    words = [told] if told else []
+    # what came before the log: how far grains were shifted then is not known
+    before = history.projected[:max(0, len(history) - known)]
+    if (before > 0).any():
+        grade = BAD if grade == BAD else DOUBT
+        part = percent(float((before > 0).mean()))
+        words.append(f"projected in {part} of the steps" if known == 0 else f"before the restart, projected in {part} of {len(before)} steps")
+    if not words:
         return Answer(question, GOOD, f"No step projected overlaps. {overlap}")
-    grade = BAD if share > OFTEN else DOUBT
-    return Answer(question, grade, f"{'Yes, often' if grade == BAD else 'A little'}: {words}. {overlap}")
+    often = share > OFTEN or (len(before) > 0 and float((before > 0).mean()) > OFTEN)
+    return Answer(question, grade, f"{'Yes, often' if often else 'A little'}: {'; '.join(words)}. {overlap}")
+
+
+def last_part(log, history):
+    """Steps since the last restart, which the log names by the step of its checkpoint."""
+    found = re.match(r"from the checkpoint of step (\d+)", log.value("restart"))
+    return int((history.step > int(found[1])).sum()) if found else len(history)
+
+
+def too_fast(history):
+    """Whether something went too far in a step to be seen by what it passed."""
+    if "fast" not in history or not (history.fast > 0).any():
+        return []
+    return [Answer("Was the step short enough?", DOUBT, f"Not always: {int(history.fast.sum())} times something moved by more than half of its thickness in a step, "
+                   f"in {int((history.fast > 0).sum())} steps. It may have passed through others.")]
 
 
 def balanced(log):
@@ -104,7 +130,8 @@ def balanced(log):
         return []
     off, turned = (float(text) for text in found.groups())
     grade = GOOD if off <= BALANCED * turned else DOUBT if off <= UNBALANCED * turned else BAD
-    return [Answer("Do the energies balance?", grade, said[0].upper() + said[1:] + ".")]
+    since = " These are the energies since the last restart." if log.restarts > 0 else ""
+    return [Answer("Do the energies balance?", grade, said[0].upper() + said[1:] + "." + since)]
 
 
 def readable(notes):
@@ -122,7 +149,8 @@ def answers(log, history, options, notes):
     """Answers to all questions of a run; `notes` name files that are missing or damaged."""
     solver = (options.get("solver") or [{}])[0]
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(history, solver), mended(log, history), *balanced(log), *readable(notes)]
+    return [ended(log, history, steps), converged(log, history), accurate(history, solver), mended(log, history), *too_fast(history), *balanced(log),
+            *readable(notes)]
 
 
 def headline(found, log):

@@ -6,7 +6,7 @@ module gravier_user_boundaries
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_boundary, only: boundary_t
   use gravier_scene_boundaries, only: check_pressed
-  use gravier_user_loop, only: user_loop_t
+  use gravier_user_loop, only: user_loop_t, numbers_text
   implicit none
   private
   public :: get_boundary, set_boundary
@@ -106,6 +106,7 @@ contains
     end associate
     call loop%run%simulation%wake()
     call loop%note(name, b, values)
+    call loop%note_setting(name//" of boundary '"//loop%run%simulation%decomposition%boundaries(b)%name//"'", numbers_text(values))
   end subroutine set_boundary
 
   subroutine set_velocity(boundary, values, error)

@@ -14,7 +14,7 @@ module gravier_user_loop
   use gravier_open_run, only: open_run_t
   implicit none
   private
-  public :: user_loop_t
+  public :: user_loop_t, numbers_text
 
   type :: user_loop_t
     type(communicator_t) :: comm
@@ -25,8 +25,10 @@ module gravier_user_loop
     integer(i8) :: settings = 0
     !> of grains with each other
     type(coefficients_t) :: between_grains
-    !> since the last step, velocities of bodies were set on this rank; velocities or forces were
-    logical, private :: velocities_set = .false., bodies_set = .false.
+    !> since the last step, velocities of bodies were set on this rank; forces were; one of both
+    logical, private :: velocities_set = .false., forces_set = .false., bodies_set = .false.
+    !> lines about what was set since the last step for the first time, which the log has with the next one
+    character(len=:), allocatable, private :: unsaid
     !> why the run is over, where an error has ended it
     type(error_t), allocatable, private :: cause
   contains
@@ -43,6 +45,7 @@ module gravier_user_loop
     procedure :: set_gravity => user_loop_set_gravity
     procedure :: set_friction => user_loop_set_friction
     procedure :: note => user_loop_note
+    procedure :: note_setting => user_loop_note_setting
   end type user_loop_t
 
 contains
@@ -68,6 +71,7 @@ contains
         end do
       end do
     end associate
+    self%unsaid = ""
     self%between_grains = self%run%simulation%config%scene%contact
     if (forces) call self%run%simulation%take_forces()
   end subroutine user_loop_open
@@ -85,7 +89,7 @@ contains
   subroutine user_loop_step(self, error)
     class(user_loop_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: mark(4)
+    real(dp) :: mark(5)
 
     if (.not. self%goes_on()) then
       call raise(error, status_input, "step: the run is over after step "//to_text(self%run%simulation%step)// &
@@ -98,6 +102,7 @@ contains
     ! a rank sets what belongs to its own bodies, and may have none
     mark(3) = merge(1.0_dp, 0.0_dp, self%velocities_set)
     mark(4) = merge(1.0_dp, 0.0_dp, self%bodies_set)
+    mark(5) = merge(1.0_dp, 0.0_dp, self%forces_set)
     call self%comm%highest_of(mark)
     if (abs(mark(1) + mark(2)) > 0.0_dp) then
       call raise(error, status_input, "step: ranks have set different drives, loads, coefficients or bodies; "// &
@@ -106,9 +111,13 @@ contains
     end if
     self%run%simulation%velocities_set = mark(3) > 0.0_dp
     if (mark(4) > 0.0_dp) call self%run%simulation%wake()
+    if (mark(5) > 0.0_dp) call self%note_setting("forces of bodies", "")
     self%velocities_set = .false.
+    self%forces_set = .false.
     self%bodies_set = .false.
-    call self%run%step(error)
+    if (self%unsaid /= "") call self%run%tell(self%unsaid, error)
+    self%unsaid = ""
+    if (.not. allocated(error)) call self%run%step(error)
     if (allocated(error)) self%cause = error
   end subroutine user_loop_step
 
@@ -193,6 +202,35 @@ contains
     end do
     self%settings = hash_words(words)
   end subroutine user_loop_note
+
+  !> Remember that the loop has set something that acts until it is set again, and have the log say so the first time.
+  pure subroutine user_loop_note_setting(self, what, values)
+    class(user_loop_t), intent(inout) :: self
+    !> its numbers; empty where there are too many
+    character(len=*), intent(in) :: what, values
+
+    associate (simulation => self%run%simulation)
+      if (index(", "//simulation%set_by_loop//",", ", "//what//",") > 0) return
+      if (simulation%set_by_loop /= "") simulation%set_by_loop = simulation%set_by_loop//", "
+      simulation%set_by_loop = simulation%set_by_loop//what
+      self%unsaid = self%unsaid//"loop        sets "//what//" from step "//to_text(simulation%step + 1)//" on"
+      if (values /= "") self%unsaid = self%unsaid//", at first to "//values
+      self%unsaid = self%unsaid//"; a restart begins without it"//new_line("a")
+    end associate
+  end subroutine user_loop_note_setting
+
+  !> Numbers with blanks between.
+  pure function numbers_text(values) result(text)
+    real(dp), intent(in) :: values(:)
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = ""
+    do k = 1, size(values)
+      text = text//" "//to_text(values(k), 4)
+    end do
+    text = text(2:)
+  end function numbers_text
 
   !> Number of a boundary by its name. Failure: status_input, with the names there are.
   subroutine user_loop_place(self, name, b, error)
@@ -300,6 +338,7 @@ contains
     associate (owned => self%run%simulation%decomposition%owned(s))
       if (name == "force") then
         owned%force(:, :) = values
+        self%forces_set = .true.
       else
         do k = 1, owned%n
           if (owned%glued(k) == 0) owned%velocity(:, k) = values(:, k)
@@ -328,6 +367,7 @@ contains
       simulation%physics%gravity(1:nd) = gravity
       call simulation%wake()
       call self%note("gravity", 0, gravity)
+      call self%note_setting("gravity", numbers_text(gravity))
     end associate
   end subroutine user_loop_set_gravity
 
@@ -361,6 +401,9 @@ contains
       call simulation%wake()
       value(1) = friction
       call self%note("friction", b, value)
+      if (b == 0) call self%note_setting("friction between grains", numbers_text(value))
+      if (b > 0) call self%note_setting("friction of boundary '"//simulation%decomposition%boundaries(b)%name//"'", &
+        & numbers_text(value))
     end associate
   end subroutine user_loop_set_friction
 

@@ -27,6 +27,8 @@ module gravier_checkpoint
 
   character(len=*), parameter :: checkpoint_name = "checkpoint.h5"
   character(len=*), parameter :: newline = achar(10)
+  !> what the text of a loop's settings begins with: texts are not empty
+  character(len=*), parameter :: settings_mark = "set:"
 
 contains
 
@@ -53,7 +55,8 @@ contains
       end associate
     end do
     text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
-    text = text//"files: names"//newline//"partition: "//head_record//", "//to_text(head_words)//" words"
+    text = text//"files: names"//newline//"loop: names of settings"//newline
+    text = text//"partition: "//head_record//", "//to_text(head_words)//" words"
   end function records_text
 
   !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
@@ -69,6 +72,7 @@ contains
     call file%create(simulation%comm, path, records_text(), error)
     call file%write_text("scene", fixed_options(simulation), error)
     call file%write_text("files", simulation%files, error)
+    call file%write_text("set_by_loop", settings_mark//simulation%set_by_loop, error)
     call file%write_scalar("subdomains", int(simulation%decomposition%n_subdomains, i8), error)
     call file%write_scalar("time_step", simulation%physics%h, error)
     call file%write_scalar("theta", simulation%config%time%theta, error)
@@ -146,6 +150,7 @@ contains
     call file%read_scalar("step", step, error)
     call check_steps(simulation, step, path, error)
     call file%read_text("files", simulation%files, error)
+    call file%read_text("set_by_loop", simulation%set_before, error)
     call file%read_scalar("time", simulation%time, error)
     call file%read_scalar("grains", simulation%n_grains, error)
     call file%read_scalar("glued", simulation%n_glued, error)
@@ -186,6 +191,7 @@ contains
     ! steps that were at rest by another measure do not count
     if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp) simulation%quiet = own_quiet
     simulation%restarted = .true.
+    simulation%set_before = simulation%set_before(len(settings_mark) + 1:)
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)
     call load_grains(simulation, file, path, builds, error)

@@ -68,6 +68,7 @@ module gravier_open_run
     procedure :: begin => open_run_begin
     procedure :: goes_on => open_run_goes_on
     procedure :: step => open_run_step
+    procedure :: tell => open_run_tell
     procedure :: write_checkpoint => open_run_write_checkpoint
     procedure :: stop => open_run_stop
     procedure :: finish => open_run_finish
@@ -136,6 +137,23 @@ contains
     goes_on = self%is_open .and. .not. (self%ends .or. self%interruption%stops)
     if (goes_on) goes_on = .not. is_over(self)
   end function open_run_goes_on
+
+  !> Write lines into the log. Errors are the same on all ranks. Collective.
+  subroutine open_run_tell(self, lines, error)
+    class(open_run_t), intent(inout) :: self
+    !> each with its newline
+    character(len=*), intent(in) :: lines
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: first, last
+
+    first = 1
+    do while (first <= len(lines))
+      last = first + index(lines(first:), new_line("a")) - 2
+      call self%log%line(lines(first:last), error)
+      first = last + 2
+    end do
+    call self%simulation%comm%agree(error)
+  end subroutine open_run_tell
 
   !> Make one step and write what is due then. After an error, which is the same on all ranks, the run is to be finished.
   !> Collective.
@@ -286,6 +304,8 @@ contains
     if (older /= "") call log%line("warning     "//directory//" holds files of an older run, which stay as they are: "// &
       & older, error)
     if (restart) call log%write_restart(simulation, error)
+    if (simulation%set_before /= "") call log%line("warning     a loop had set: "//simulation%set_before// &
+      & ". What the case has instead acts from here on, until it is set again", error)
     call log%write_head(error)
     call log%open(directory//"/run.log", simulation%restarted, error)
     call simulation%comm%agree(error)

@@ -59,6 +59,9 @@ module gravier_simulation
     logical :: restarted = .false.
     !> names of the files that the run has, those before a restart among them, with commas between
     character(len=:), allocatable :: files
+    !> what a loop of the user's own has set since the run began or went on from a checkpoint, and what it had set before that, and
+    !> no checkpoint keeps; with commas between
+    character(len=:), allocatable :: set_by_loop, set_before
   contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
@@ -318,6 +321,8 @@ contains
     self%last_written = -1
     self%restarted = .false.
     self%files = ""
+    self%set_by_loop = ""
+    self%set_before = ""
   end subroutine simulation_free
 
   !> Remember the files that the run has from now on, beside those that it had before a restart.

@@ -164,16 +164,47 @@ class Report(RunTestCase):
 
     def test_balance(self):
         """A balance that is off by a part of the energy turned over is none."""
-        class Said:
-            def __init__(self, text):
-                self.text = text
-
-            def value(self, name):
-                return self.text if name == "energy" else ""
         for off, grade in (("1.0E-13", "good"), ("1.0E-03", "doubt"), ("2.1E+00", "bad")):
-            (answer,) = verdict.balanced(Said(f"balance off by {off} J, of 2.09E+00 J turned over"))
+            (answer,) = verdict.balanced(RunLog(f"energy      balance off by {off} J, of 2.09E+00 J turned over\n"))
             self.assertEqual(answer.grade, grade)
-        self.assertEqual(verdict.balanced(Said("")), [])
+            self.assertNotIn("since", answer.text)
+        self.assertEqual(verdict.balanced(RunLog("")), [])
+        (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J, of 1.0 J turned over\n"))
+        self.assertIn("since the last restart", answer.text)
+
+    def test_mended(self):
+        """Projections are judged as the last words judge them, by how often and how far they shift grains; those before a restart count."""
+        def history(steps, projected):
+            table = gravier.results.Table(step=np.arange(1, steps + 1), max_overlap=np.full(steps, 1e-4), projected=np.zeros(steps))
+            table["projected"][:projected] = 1
+            return table
+        often = "            projected in 30 of 100 steps (30 %): shifts of a grain add up to 1.0E-09 m on average, {} of its path of 1.0E-03 m\n"
+        seldom = often.replace("30 of", "3 of").replace("(30 %)", "(3 %)")
+        none = "            no step projected overlaps\n"
+        head = "Gravier 0.1.0 (a), dense\n"
+        restart = 2 * head + "restart     from the checkpoint of step 200\n"
+        for text, steps, projected, grade, words in (
+                (head + often.format("1.8E-07"), 100, 30, "doubt", "Yes, often: projected in 30 of 100 steps"),
+                (head + often.format("2.0E-02"), 100, 30, "bad", "Yes, often: projected in 30 of 100 steps"),
+                (head + seldom.format("1.8E-07"), 100, 3, "good", "A little: projected in 3 of 100 steps"),
+                (head + seldom.format("2.0E-02"), 100, 3, "doubt", "A little: projected in 3 of 100 steps"),
+                (head + none, 100, 100, "good", "No step projected overlaps"),
+                (head, 100, 30, "doubt", "Yes, often: projected in 30 % of the steps"),
+                (restart + none, 300, 42, "doubt", "Yes, often: before the restart, projected in 21 % of 200 steps"),
+                (restart + seldom.format("1.8E-07"), 300, 0, "good", "A little: projected in 3 of 100 steps"),
+                (restart + often.format("2.0E-02"), 300, 2, "bad", "before the restart, projected in 1 % of 200 steps")):
+            answer = verdict.mended(RunLog(text), history(steps, projected))
+            self.assertEqual(answer.grade, grade, text)
+            self.assertIn(words, answer.text)
+
+    def test_too_fast(self):
+        """What moved too far for the step is marked, as the last words have it."""
+        table = gravier.results.Table(step=np.arange(1, 5), fast=np.array([0, 3, 1, 0]))
+        (answer,) = verdict.too_fast(table)
+        self.assertEqual(answer.grade, "doubt")
+        self.assertIn("4 times something moved by more than half of its thickness in a step, in 2 steps", answer.text)
+        table["fast"][:] = 0
+        self.assertEqual(verdict.too_fast(table), [])
 
     def test_what_was_asked(self):
         """Keys with other values than the defaults, with units, defaults and meanings; a density that is the default is left out."""

@@ -78,6 +78,36 @@ with gravier.Simulation(case, quiet=True, restart=True) as s:
         moving = merged(HEAP, {"output": {"checkpoint_every": 0}, "scene": {"friction": 0.0, "rotation": False}})
         self.play("energy", moving, script)
 
+    def test_what_was_set_is_told(self):
+        """The log has a line where a loop sets something for the first time, and a restart warns that the values of the case act again."""
+        script = """
+with gravier.Simulation(case, quiet=True, forces=True) as s:
+    s.step()
+    s.boundaries["floor"].friction = 0.5
+    s.gravity = (0.0, -1.0)
+    s.step()
+    s.gravity = (0.0, -2.0)
+    s.boundaries["left"].velocity = (0.0, 0.25)
+    if s.rank == s.ranks - 1:
+        s.bodies.force = np.zeros((len(s.bodies.id), 2))
+    s.step()
+    s.checkpoint()
+"""
+        told = ["friction of boundary 'floor' from step 2 on, at first to 5.000E-01", "gravity from step 2 on, at first to 0.000E+00 -1.000E+00",
+                "velocity of boundary 'left' from step 3 on, at first to 0.000E+00 2.500E-01", "forces of bodies from step 3 on"]
+        names = ", ".join(text.split(" from step")[0] for text in told)
+        for ranks in (1, 2):
+            case = merged(HEAP, {"output": {"checkpoint_every": 0}, "time": {"steps": 5}})
+            loop = self.play(f"told{ranks}", case, script, ranks=ranks)
+            with open(loop.path("results", "run.log"), encoding="utf-8") as file:
+                lines = [line.rstrip("\n") for line in file if line.startswith("loop ")]
+            self.assertEqual(lines, [f"loop        sets {text}; a restart begins without it" for text in told])
+            again = gravier("--restart", "case.nml", directory=loop.directory, ranks=ranks)
+            self.assert_status(again, 0)
+            self.assertIn(f"warning     a loop had set: {names}. What the case has instead acts from here on, until it is set again\n", again.stdout)
+            once_more = gravier("--restart", "case.nml", directory=loop.directory)
+            self.assert_status(once_more, 0)
+
     def test_checkpoint_by_hand(self):
         script = """
 with gravier.Simulation(case, quiet=True) as s:

@@ -295,6 +295,7 @@ contains
     call expect_end(table)
     ! step 2 was the last one before the checkpoint
     simulation%restarted = .true.
+    call simulation%note_files("run.log,history.csv")
     simulation%step = 2
     call write_rows(simulation, 3, 4)
     call table%open("history.csv", error)
