@@ -245,6 +245,8 @@ contains
       if (time%stop_boundary /= "") call miss(report, "time", "stop_displacement", error, &
                                               shown_text(report, "time", "stop_boundary"))
       if (time%stop_displacement_given) call miss(report, "time", "stop_boundary", error, "stop_displacement")
+      call expect(report, time%stop_boundary /= "" .or. .not. time%stop_displacement_given, "time", "stop_boundary", error, &
+                  "the name of the boundary that stop_displacement is for")
       call expect(report, time%stop_displacement > 0.0_dp .or. .not. time%stop_displacement_given, "time", "stop_displacement", &
                   error)
       call expect(report, time%stop_grains_at_most >= 0, "time", "stop_grains_at_most", error)

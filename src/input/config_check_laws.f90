@@ -64,7 +64,7 @@ contains
     text = "the name of a &material, and there is none"
     do i = 1, size(config%materials)
       if (i == 1) text = "'"//trim(config%materials(1)%name)//"'"
-      if (i > 1) text = text//merge(" or ", ",   ", i == size(config%materials))//"'"//trim(config%materials(i)%name)//"'"
+      if (i > 1) text = text//trim(merge(" or", ",  ", i == size(config%materials)))//" '"//trim(config%materials(i)%name)//"'"
     end do
   end function names_of
 

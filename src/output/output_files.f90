@@ -11,15 +11,15 @@ module gravier_output_files
   use gravier_output_registry, only: output_holder_t, registered_outputs
   implicit none
   private
-  public :: check_paths, refuse_directory, older_files, own_files
+  public :: check_paths, check_origins, refuse_directory, older_files, own_files
 
   !> of every run
   character(len=*), parameter :: log_name = "run.log"
 
 contains
 
-  !> Refuse an output directory that cannot be written to, an output whose place a directory has, an input that the run would
-  !> replace by an output, and a file of another origin in the place of an output. Rank 0 looks and writes nothing.
+  !> Refuse an output directory that cannot be written to, an output whose place a directory has, and an input that the run would
+  !> replace by an output. Rank 0 looks and writes nothing.
   !> Failure: status_input, with the key. Collective.
   subroutine check_paths(comm, config, error)
     type(communicator_t), intent(in) :: comm
@@ -47,7 +47,6 @@ contains
       do b = 1, size(config%insertions)
         call check_input(config%insertions(b)%radius_table, "&insertion '"//trim(config%insertions(b)%name)//"' radius_table")
       end do
-      call check_origins(config, names, error)
     end if
     call comm%agree(error)
 
@@ -107,23 +106,31 @@ contains
     end do
   end subroutine check_outputs
 
-  !> Refuse outputs whose place a file of another origin has. Not collective.
-  subroutine check_origins(config, names, error)
+  !> Refuse outputs whose place a file of another origin has. Files that a restart goes on with are read then, but not the log,
+  !> which is added to. Rank 0 looks. Failure: status_input. Collective.
+  subroutine check_origins(comm, config, known, error)
+    type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
-    !> of the files, with commas between
-    character(len=*), intent(in) :: names
+    !> names of the files that the run goes on with, with commas between; empty for a run that begins
+    character(len=*), intent(in) :: known
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: name
+    character(len=:), allocatable :: names, name
     integer :: first
 
-    first = 1
-    do
-      call take_name(names, first, name)
-      if (name == "" .or. allocated(error)) exit
-      if (.not. may_replace(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
-        & ": &output directory = '"//trim(config%output%directory)//"': the file "//name//" in it is none of this program, "// &
-        & "and is not replaced; expected another directory, or another name for that file")
-    end do
+    if (allocated(error)) return
+    if (comm%rank == 0) then
+      names = own_files(config)
+      first = 1
+      do
+        call take_name(names, first, name)
+        if (name == "" .or. allocated(error)) exit
+        if (name /= log_name .and. index(","//known//",", ","//name//",") > 0) cycle
+        if (.not. may_replace(trim(config%output%directory)//"/"//name)) call raise(error, status_input, config%file// &
+          & ": &output directory = '"//trim(config%output%directory)//"': the file "//name//" in it is none of this program, "// &
+          & "and is not replaced; expected another directory, or another name for that file")
+      end do
+    end if
+    call comm%agree(error)
   end subroutine check_origins
 
   !> Names of files that an older run has left in the output directory and that this one does not replace, with commas between.

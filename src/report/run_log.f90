@@ -210,7 +210,7 @@ contains
     class(run_log_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
     call self%line("    step       time [s]    contacts  iterations   residual  error/scale    overlap [m]  "// &
-      & "energy [J]  wall [s]  remaining", error)
+      & "energy [J]  wall [s]   remaining", error)
   end subroutine run_log_write_head
 
   !> What the first solve starts from, where the bodies file gives contacts with forces.
@@ -304,8 +304,8 @@ contains
       return
     end if
     if (self%progress%line_due(simulation%step == simulation%config%time%steps)) then
-      write (row, "(i8,es15.6,i12,i12,es11.2,es13.2,es15.3,es12.3,f10.3,a11)") simulation%step, simulation%time, figures%contacts, &
-        & figures%solve%iterations, figures%solve%residual, relative_error(figures%solve), figures%max_overlap, &
+      write (row, "(i8,es15.6,i12,i12,es11.2,es13.2,es15.3,es12.3,f10.3,1x,a11)") simulation%step, simulation%time, &
+        & figures%contacts, figures%solve%iterations, figures%solve%residual, relative_error(figures%solve), figures%max_overlap, &
         & figures%kinetic_energy, seconds, remaining_text(self, simulation)
       if (self%live) then
         call note_line(self, trim(row), error)

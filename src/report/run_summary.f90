@@ -214,12 +214,18 @@ contains
     end associate
   end function may_loosen
 
-  !> Whether overlaps have grown beyond what is allowed; where they are not projected, beyond a hundredth of the mean radius,
-  !> or of half of the mean thickness.
-  logical function overlaps_grew(simulation) result(grew)
+  !> Whether overlaps have grown beyond what is allowed, and mending them shifts grains by more than a little of their paths; where
+  !> they are not projected, beyond a hundredth of the mean radius, or of half of the mean thickness.
+  pure logical function overlaps_grew(simulation) result(grew)
     type(simulation_t), intent(in) :: simulation
-    grew = simulation%tally%overlaps_grew(merge(simulation%overlap_allowed, 0.01_dp*simulation%mean_half_thickness, &
-      & simulation%overlap_allowed < huge(1.0_dp)))
+
+    associate (tally => simulation%tally)
+      if (simulation%overlap_allowed < huge(1.0_dp)) then
+        grew = tally%overlaps_grew(simulation%overlap_allowed) .and. .not. tally%shift < little*tally%path
+      else
+        grew = tally%overlaps_grew(0.01_dp*simulation%mean_half_thickness)
+      end if
+    end associate
   end function overlaps_grew
 
   !> The dearest phases.
@@ -275,7 +281,7 @@ contains
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
           & to_text(simulation%comm%size)//" ranks own no subdomain and wait: choose as many &decomposition "// &
           & "subdomains as ranks, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
-      else if (phases(phase_output) > half .and. config%output%every > 0) then
+      else if (phases(phase_output) > half .and. config%output%every > 0 .and. config%output%every < config%time%steps) then
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
         text = "solves that do not converge take most of the iterations: see `to mend it`"

@@ -2,7 +2,7 @@
 module gravier_checkpoint_scene
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, growing_text_t
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_shape_names, only: library_digest
   use gravier_time_table, only: time_table_t
@@ -108,7 +108,8 @@ contains
       line = "(nothing)"
       return
     end if
-    length = index(text(at:)//newline, newline) - 1
+    length = index(text(at:), newline) - 1
+    if (length < 0) length = len(text) - at + 1
     line = text(at:at + length - 1)
     at = at + length + 1
   end subroutine next_line
@@ -117,12 +118,12 @@ contains
   function fixed_options(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    type(growing_text_t) :: lines
     character(len=:), allocatable :: options, line
     integer :: at, b
     logical :: fixed
 
     call write_active(options, simulation%config)
-    text = ""
     fixed = .false.
     at = 1
     do while (at <= len(options))
@@ -130,7 +131,7 @@ contains
       if (line(1:min(1, len(line))) == "&") fixed = index(fixed_groups//" ", line//" ") > 0
       ! starts are over
       if (index(line, "  title = ") == 1 .or. index(line, "  start_overlap = ") == 1) cycle
-      if (fixed) text = text//line//newline
+      if (fixed) call lines%add(line//newline)
     end do
     if (simulation%decomposition%shapes%n > 0) call add_contents(trim(simulation%config%scene%shapes), &
       & library_digest(simulation%decomposition%shapes))
@@ -145,6 +146,7 @@ contains
         if (boundary%is_faceted()) call add_contents(trim(given%file), boundary%surface%digest())
       end associate
     end do
+    text = lines%get()
 
   contains
 
@@ -159,7 +161,7 @@ contains
       character(len=*), intent(in) :: path
       integer(i8), intent(in) :: digest
 
-      text = text//contents_of//path//digest_mark//to_text(digest)//newline
+      call lines%add(contents_of//path//digest_mark//to_text(digest)//newline)
     end subroutine add_contents
 
   end function fixed_options

@@ -26,7 +26,7 @@ module gravier_open_run
   use gravier_accuracy_lines, only: goal_name
   use gravier_output, only: after_solve, of_each_step, of_states, of_checkpoints
   use gravier_run_output, only: run_output_t
-  use gravier_output_files, only: check_paths, refuse_directory, older_files, own_files
+  use gravier_output_files, only: check_paths, check_origins, refuse_directory, older_files, own_files
   use gravier_run_end, only: has_ended, end_line
   implicit none
   private
@@ -100,11 +100,13 @@ contains
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
     call check_paths(comm, config, error)
+    if (.not. restart) call check_origins(comm, config, "", error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
     if (restart) call claim_directory(comm, config, command, self%lock, error)
     if (.not. allocated(error)) call start(self%simulation, grains, restart, error)
+    if (restart .and. .not. allocated(error)) call check_origins(comm, config, self%simulation%files, error)
     ! what they took is for the steps
     deallocate (grains)
     if (.not. restart) call claim_directory(comm, config, command, self%lock, error)

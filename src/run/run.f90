@@ -14,7 +14,7 @@ module gravier_run
   use gravier_memory_report, only: peak_memory
   use gravier_run_log, only: run_log_t
   use gravier_open_run, only: open_run_t
-  use gravier_output_files, only: check_paths
+  use gravier_output_files, only: check_paths, check_origins
   implicit none
   private
   public :: run_case, check_case, report_error
@@ -61,6 +61,7 @@ contains
     call log%init(comm)
     call read_config(comm, path, config, error)
     call check_paths(comm, config, error)
+    call check_origins(comm, config, "", error)
     libraries = peak_memory()
     if (.not. allocated(error)) call simulation%init(comm, config, error)
     call check_start_overlap(simulation, error)

@@ -85,7 +85,8 @@ contains
       & bytes_of_grain(config) - data_bytes(config%scene%dimension), error)
   end subroutine check_read_grains
 
-  !> The same for grains that are to enter until the end of the run, as far as their number is bounded. Collective.
+  !> The same for grains that are to enter until the end of the run, as far as their number is bounded. How many of them a scene
+  !> with outlets has at once is not known. Collective.
   subroutine check_entering_grains(comm, config, insertions, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -94,6 +95,7 @@ contains
     real(dp) :: number
     integer :: i
 
+    if (any(config%boundaries%shape == "outlet")) return
     do i = 1, size(insertions)
       if (allocated(error)) return
       number = insertions(i)%planned(config%time%steps*config%time%step)

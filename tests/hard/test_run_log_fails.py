@@ -1,11 +1,12 @@
-"""A disk that is full for run.log alone: one rank has the error of a line, and all of them end with it."""
+"""A disk that is full for run.log alone: one rank has the error of a line, and all of them end with it. A limit of the size of files is an
+error too, and a reader of the standard output that goes away is none."""
 import os
 import shutil
 import subprocess
 import unittest
 import unittest.mock
 
-from gravier_runs import RunTestCase, merged, run_case, write
+from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, merged, namelist, run_case, write
 
 #: as the disk has room for all but what holds a text
 SHIM = r"""
@@ -69,6 +70,31 @@ class LogFails(RunTestCase):
 
     def test_the_last_lines(self):
         self.failing("end", "finished    all")
+
+
+class BrokenOutputs(RunTestCase):
+
+    def run_by_shell(self, title, line):
+        """Status and standard error of the program, whose call a line of a shell has."""
+        directory = self.here(title)
+        os.makedirs(directory)
+        write(os.path.join(directory, "case.nml"), namelist(merged(CASE, {"time": {"steps": 400}, "output": {"every": 50}})))
+        done = subprocess.run(["bash", "-c", line.format(gravier=os.path.join(PROGRAMS, "gravier"))], cwd=directory, capture_output=True, text=True,
+                              env={**os.environ, **ENVIRONMENT}, check=False)
+        return done.returncode, done.stderr, sorted(os.listdir(os.path.join(directory, "results")))
+
+    def test_nobody_reads_the_standard_output(self):
+        status, said, files = self.run_by_shell("head", "{gravier} case.nml | head -2 > /dev/null; exit ${{PIPESTATUS[0]}}")
+        self.assertEqual((status, said), (0, ""))
+        with open(self.here("head/results/run.log"), encoding="utf-8") as file:
+            self.assertTrue(file.readlines()[-1].startswith("finished    all 400 steps"))
+        self.assertEqual(files, ["checkpoint.h5", "history.csv", "results.h5", "run.log", "step_3.hdf5"])
+
+    def test_a_limit_of_the_size_of_files(self):
+        status, said, files = self.run_by_shell("limit", "ulimit -f 60; {gravier} case.nml > /dev/null")
+        self.assertEqual((status, len(said.splitlines())), (4, 1), said)
+        self.assertIn("File too large", said)
+        self.assertEqual([name for name in files if ".part" in name or ".data" in name], [])
 
 
 if __name__ == "__main__":

@@ -363,8 +363,10 @@ class Restart(RunTestCase):
         tables = {"drive.csv": "time,vx\n0,0\n1,0.1\n", "gravity.csv": "time,gx,gy\n0,0,-9\n1,0,-9.81\n"}
         for name, text in tables.items():
             write(os.path.join(directory, name), text)
-        self.assert_status(run_case(case, 1, directory), 0)
         results = os.path.join(directory, "results")
+        self.assert_status(run_case(merged(case, {"time": {"steps": 2}}), 1, directory), 0)
+        older = content(os.path.join(results, "checkpoint.h5"))
+        self.assert_status(run_case(case, 1, directory), 0)
 
         def files():
             return {name: content(os.path.join(results, name)) for name in sorted(os.listdir(results))}
@@ -392,6 +394,12 @@ class Restart(RunTestCase):
                                      rf"but \.{str(not other).lower()}\. was expected, with which this table was begun$")
             self.assertEqual(files(), now)
             self.assertEqual(run.stdout, "")
+        # beyond an older checkpoint all states stay where columns are refused
+        write(os.path.join(results, "checkpoint.h5"), older)
+        now = files()
+        refused(merged(longer, {"output": {"energy": True}}), r"results/history\.csv: line 1: no column")
+        write(os.path.join(results, "checkpoint.h5"), before["checkpoint.h5"])
+        now = before
         history = before["history.csv"].split(b"\n")
         for rows, words in ((history[:2] + history[3:], "line 3: step 3, but rows of step 2 were expected"),
                             (history[:3] + [b""], "its last row is of step 2, but rows up to step 4 were expected")):

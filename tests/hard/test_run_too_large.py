@@ -9,7 +9,7 @@ import unittest
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, RunTestCase, each, namelist, write
+from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, RunTestCase, each, gravier, namelist, write
 from killed_runs import compile_shim
 
 #: as many as a reader of 32 bits would take for 2
@@ -114,6 +114,18 @@ class TooLarge(RunTestCase):
             "time": {"step": 1e-3, "steps": 0}}))
         self.refused(limited("gravier_sample", "sample.nml", directory=here, addresses=6 * 10**9), 4,
                      r"sample\.nml: &sample count: 2147483647 grains: at least 493\.9 GB of memory are needed on this machine, where ")
+
+    def test_many_enter_and_leave(self):
+        """How many grains of an insertion a scene with an outlet has at once is not known: it is not refused; without an outlet it is."""
+        falling = {"scene": {"dimension": 2, "bodies": "none"}, "time": {"step": 1e-3, "steps": 10**9},
+                   "insertion": [{"name": "feed", "lower": [0.0, 0.0], "upper": [1.0, 0.1], "rate": 1e3, "radius": 0.01}],
+                   "boundary": [{"name": "out", "shape": "outlet", "point": [0.0, -0.2], "normal": [0.0, 1.0]}]}
+        for shape, status in (("outlet", 0), ("plane", 4)):
+            falling["boundary"][0]["shape"] = shape
+            write(self.here("feed.nml"), namelist(falling))
+            run = gravier("--check", "feed.nml", directory=self.here(""))
+            self.assertEqual(run.status, status, str(run))
+            self.assertEqual("feed.nml: &insertion 'feed': 1000000000 grains: at least" in run.stderr, status == 4, str(run))
 
     def test_limit_of_a_process(self):
         """What a rank may have is less than what the machine has."""

@@ -147,6 +147,8 @@ FILES = [
         (("floor", "wall 31"), ("&boundary name = 'wall 31': expected a name of its own, but the wall 31 of the scene has it too",)),
         (("n"*65,), ("name = '" + "n"*65 + "': expected at most 64 characters, here 65",)))),
     # a list of names with an empty one
+    ("law of a material that is none of three", f"{GOOD}&material name = 'a' /\n&material name = 'b' /\n&material name = 'c' /\n"
+     "&law materials = 'a', 'd', kind = 'none' /\n", ("&law (the 1st) materials = 'a', 'd': expected 'a', 'b' or 'c'",)),
     *((f"law of {materials}", f"{GOOD}&material name = 'a' /\n&law materials = {materials}, kind = 'none' /\n",
        (f"&law (the 1st) materials = {materials}: expected at most 2 texts in quotes, none of them empty",))
       for materials in ("'a', ''", "'', 'a'", "''")),

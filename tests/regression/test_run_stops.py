@@ -182,6 +182,7 @@ class Stops(RunTestCase):
             "&time stop_displacement is missing: expected a finite real number > 0 (m), required by stop_boundary = 'belt'":
                 {"stop_displacement": None},
             "&time stop_boundary is missing: expected a text in quotes": {"stop_boundary": None},
+            "&time stop_boundary = '': expected the name of the boundary that stop_displacement is for": {"stop_boundary": ""},
             "&time stop_displacement = 0.0: expected a finite real number > 0 (m)": {"stop_displacement": 0.0},
             "&time stop_cell_shear = 0.5: expected 0 for components of the cell that neither cell_shear_rate nor cell_shear_stress moves":
                 {"stop_cell_shear": [0.5]},

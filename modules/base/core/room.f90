@@ -6,7 +6,7 @@ module gravier_room
   use gravier_text, only: to_text
   implicit none
   private
-  public :: room_for, free_memory, process_limit, bytes_text
+  public :: room_for, free_memory, group_memory, process_limit, bytes_text
 
   !> struct rlimit of the C library.
   type, bind(C) :: limit_t
@@ -36,11 +36,14 @@ module gravier_room
 
   !> RLIMIT_AS of Linux: bytes of addresses of a process
   integer(c_int), parameter :: limit_of_addresses = 9
-  !> where the limits of a control group are, and what of them is used, in its two versions
-  character(len=*), parameter :: group_limit(2) = [character(len=48) :: "/sys/fs/cgroup/memory.max", &
-    & "/sys/fs/cgroup/memory/memory.limit_in_bytes"]
-  character(len=*), parameter :: group_use(2) = [character(len=48) :: "/sys/fs/cgroup/memory.current", &
-    & "/sys/fs/cgroup/memory/memory.usage_in_bytes"]
+  !> control groups in their two versions: where their directories are, what a line with the group of a process has before its path,
+  !> and, in the directory of a group, its limit, what of it is used, and what of that are files which the system forgets at need
+  character(len=*), parameter :: group_root(2) = [character(len=24) :: "/sys/fs/cgroup", "/sys/fs/cgroup/memory"]
+  character(len=*), parameter :: group_mark(2) = [character(len=8) :: "0::", ":memory:"]
+  character(len=*), parameter :: group_limit(2) = [character(len=24) :: "/memory.max", "/memory.limit_in_bytes"]
+  character(len=*), parameter :: group_use(2) = [character(len=24) :: "/memory.current", "/memory.usage_in_bytes"]
+  character(len=*), parameter :: group_files(2, 2) = reshape([character(len=20) :: "inactive_file ", "active_file ", &
+    & "total_inactive_file ", "total_active_file "], [2, 2])
   integer(i8), parameter :: kibibyte = 1024
 
 contains
@@ -66,19 +69,61 @@ contains
     room_for = n
   end function room_for
 
-  !> Bytes of memory that all processes of this machine together can still get, within the limits of the control group of this one;
-  !> 0 where the system does not tell.
+  !> Bytes of memory that all processes of this machine together can still get, within the limits of the control group of this one
+  !> and of those that this one is in; 0 where the system does not tell.
   integer(i8) function free_memory() result(bytes)
-    integer(i8) :: limit, used
+    character(len=:), allocatable :: group
     integer :: k
 
     bytes = kibibyte*(number_after("/proc/meminfo", "MemAvailable:") + number_after("/proc/meminfo", "SwapFree:"))
-    do k = 1, size(group_limit)
-      limit = number_after(trim(group_limit(k)), "")
-      used = number_after(trim(group_use(k)), "")
-      if (limit > 0 .and. bytes > 0) bytes = max(1_i8, min(bytes, limit - used))
+    do k = 1, size(group_root)
+      group = group_of(trim(group_mark(k)))
+      do
+        if (bytes > 0) bytes = max(1_i8, min(bytes, group_memory(trim(group_root(k))//group, k)))
+        if (group == "") exit
+        group = group(1:index(group, "/", back=.true.) - 1)
+      end do
     end do
   end function free_memory
+
+  !> Bytes that processes of a control group can still get; huge without a limit.
+  integer(i8) function group_memory(directory, version) result(bytes)
+    character(len=*), intent(in) :: directory
+    !> of control groups, 1 for the second one and 2 for the first one
+    integer, intent(in) :: version
+    integer(i8) :: limit
+    integer :: k
+
+    bytes = huge(bytes)
+    limit = number_after(directory//trim(group_limit(version)), "")
+    if (limit <= 0) return
+    bytes = limit - number_after(directory//trim(group_use(version)), "")
+    do k = 1, size(group_files, 1)
+      bytes = bytes + number_after(directory//"/memory.stat", trim(group_files(k, version))//" ")
+    end do
+  end function group_memory
+
+  !> Path of the control group of this process below the root of control groups; empty for that root, and where there is none.
+  function group_of(mark) result(group)
+    character(len=*), intent(in) :: mark
+    character(len=:), allocatable :: group
+    character(len=1024) :: line
+    integer :: unit, stat, at
+
+    group = ""
+    open (newunit=unit, file="/proc/self/cgroup", action="read", status="old", iostat=stat)
+    if (stat /= 0) return
+    do
+      read (unit, "(a)", iostat=stat) line
+      if (stat /= 0) exit
+      at = index(line, mark)
+      if (at == 0) cycle
+      group = trim(line(at + len(mark):))
+      exit
+    end do
+    close (unit)
+    if (group == "/") group = ""
+  end function group_of
 
   !> Bytes that this process may still get below its own limit (ulimit -v); huge without one.
   integer(i8) function process_limit() result(bytes)

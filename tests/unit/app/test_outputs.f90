@@ -93,21 +93,21 @@ contains
   !> Each kind of output asks for nothing but its own key; a stage and a schedule are set by `open`.
   subroutine test_wanted()
     ! in the order of the registry
-    character(len=*), parameter :: by_default = "checkpoint results history"
+    character(len=*), parameter :: by_default = "checkpoint history results"
     type(simulation_t) :: simulation
 
     call check_equal(wanted_by(""), by_default, "outputs of every run")
-    call check_equal(wanted_by("vtk = T"), "checkpoint results picture history", "pictures on request")
-    call check_equal(wanted_by("trace = T"), "checkpoint results history trace", "a trace on request")
-    call check_equal(wanted_by("fclib_step = 3"), "checkpoint results history problem", "a contact problem on request")
-    call check_equal(wanted_by("final_bodies = T"), "checkpoint results history bodies", "final bodies on request")
+    call check_equal(wanted_by("vtk = T"), "checkpoint history results picture", "pictures on request")
+    call check_equal(wanted_by("trace = T"), "checkpoint history trace results", "a trace on request")
+    call check_equal(wanted_by("fclib_step = 3"), "checkpoint history results problem", "a contact problem on request")
+    call check_equal(wanted_by("final_bodies = T"), "checkpoint history results bodies", "final bodies on request")
     call make(scene//" /"//newline//"&output every = 3, vtk = T, trace = T, fclib_step = 5, final_bodies = T, "// &
       & "checkpoint_every = 4 /", simulation)
     call check_schedule(simulation, 1, of_checkpoints, " 0 4", "checkpoint")
-    call check_schedule(simulation, 2, of_states, " 0 3 6 7", "results")
-    call check_schedule(simulation, 3, of_states, " 0 3 6 7", "pictures")
-    call check_schedule(simulation, 4, of_each_step, " 0 1 2 3 4 5 6 7", "history")
-    call check_schedule(simulation, 5, of_each_step, " 0 1 2 3 4 5 6 7", "trace")
+    call check_schedule(simulation, 4, of_states, " 0 3 6 7", "results")
+    call check_schedule(simulation, 5, of_states, " 0 3 6 7", "pictures")
+    call check_schedule(simulation, 2, of_each_step, " 0 1 2 3 4 5 6 7", "history")
+    call check_schedule(simulation, 3, of_each_step, " 0 1 2 3 4 5 6 7", "trace")
     call check_schedule(simulation, 6, after_solve, " 5", "contact problem")
     call check_schedule(simulation, 7, of_end, "", "final bodies")
     call simulation%free()

@@ -3,7 +3,8 @@ program test_room
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_failure
-  use gravier_room, only: room_for, free_memory, process_limit, bytes_text
+  use gravier_file_system, only: make_directory, remove_file
+  use gravier_room, only: room_for, free_memory, group_memory, process_limit, bytes_text
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   !> more than addresses reach
@@ -23,6 +24,7 @@ program test_room
   call expect("more than can be counted: out of memory: 147.6 EB could not be allocated")
   call check(free_memory() > 2_i8**20, "some memory is free")
   call check(process_limit() > 2_i8**20, "and a process may have it")
+  call test_groups()
   call check_equal(bytes_text(0.0_dp), "0.0 kB", "none")
   call check_equal(bytes_text(1.26e6_dp), "1.3 MB", "megabytes")
   call check_equal(bytes_text(999.96e6_dp), "1.0 GB", "nearly the next unit")
@@ -33,6 +35,41 @@ program test_room
   call MPI_Finalize()
 
 contains
+
+  !> Control groups: what files take in memory is free, in both versions.
+  subroutine test_groups()
+    character(len=*), parameter :: names(5) = [character(len=21) :: "memory.max", "memory.current", "memory.stat", &
+      & "memory.limit_in_bytes", "memory.usage_in_bytes"]
+    integer :: k
+
+    call make_directory("group", error)
+    do k = 1, size(names)
+      call remove_file("group/"//trim(names(k)))
+    end do
+    call check_equal(group_memory("group", 1), huge(1_i8), "no group has no limit")
+    call write_line("group/memory.max", "max")
+    call check_equal(group_memory("group", 1), huge(1_i8), "a group without a limit")
+    call write_line("group/memory.max", "8000000000")
+    call write_line("group/memory.current", "7000000000")
+    call check_equal(group_memory("group", 1), 1000000000_i8, "without statistics")
+    call write_line("group/memory.stat", "anon 900"//new_line("a")//"inactive_file 5000000000"//new_line("a")// &
+      & "active_file 1000000")
+    call check_equal(group_memory("group", 1), 6001000000_i8, "files in memory are given back")
+    call write_line("group/memory.limit_in_bytes", "100")
+    call write_line("group/memory.usage_in_bytes", "90")
+    call write_line("group/memory.stat", "inactive_file 1"//new_line("a")//"total_inactive_file 20"//new_line("a")// &
+      & "total_active_file 5")
+    call check_equal(group_memory("group", 2), 35_i8, "the first version")
+  end subroutine test_groups
+
+  subroutine write_line(path, text)
+    character(len=*), intent(in) :: path, text
+    integer :: unit
+
+    open (newunit=unit, file=path, action="write", status="replace")
+    write (unit, "(a)") text
+    close (unit)
+  end subroutine write_line
 
   !> The same error is wanted; it is taken away.
   subroutine expect(message)
