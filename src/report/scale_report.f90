@@ -3,6 +3,7 @@
 module gravier_scale_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
+  use gravier_time_table, only: time_table_t
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
   implicit none
@@ -25,6 +26,8 @@ module gravier_scale_report
   real(dp), parameter :: most_relative_step = 0.1_dp
   !> fraction of the speed of a wall that errors may have in slow shear
   real(dp), parameter :: error_share = 0.05_dp
+  !> part of the ups and downs of a table that steps should keep
+  real(dp), parameter :: least_kept = 0.9_dp
 
 contains
 
@@ -76,6 +79,7 @@ contains
     real(dp) :: error
     real(dp) :: g, a, most, half
     character(len=:), allocatable :: halves, least
+    integer :: b
 
     text = ""
     number = 0
@@ -100,6 +104,13 @@ contains
         & least//" in it", most_by_boundary*scales%smallest/scales%speed)
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       call warn(cell_warning(simulation, d))
+      call warn(table_warning(simulation, simulation%gravity_table, "&scene gravity_table = '"// &
+        & trim(simulation%config%scene%gravity_table)//"'"))
+      do b = 1, size(simulation%decomposition%boundaries)
+        associate (boundary => simulation%decomposition%boundaries(b))
+          call warn(table_warning(simulation, boundary%table, "boundary '"//boundary%name//"': its table"))
+        end associate
+      end do
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -162,6 +173,21 @@ contains
         & "an iteration for solves to end; at least (d/L)^2 = "//figure(least)//" would do"
     end associate
   end function cell_warning
+
+  !> That steps pass over the ups and downs of a table; else empty.
+  function table_warning(simulation, table, name) result(text)
+    type(simulation_t), intent(in) :: simulation
+    type(time_table_t), intent(in) :: table
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: text
+    real(dp) :: kept
+
+    text = ""
+    if (.not. allocated(table%has)) return
+    kept = table%kept_variation(simulation%config%time%step, simulation%config%time%steps)
+    if (kept < least_kept) text = name//" turns within steps: they keep "//to_text(nint(100.0_dp*kept))// &
+      & " % of its ups and downs; a smaller &time step keeps more"
+  end function table_warning
 
   !> That the way of grains in a step is too long.
   function fast_warning(simulation, fast, step) result(text)

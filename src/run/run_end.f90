@@ -40,12 +40,16 @@ contains
     character(len=:), allocatable :: why
     integer(i8) :: grains
     real(dp) :: way
+    integer :: b
 
     why = ""
     if (rests(simulation)) then
       why = "the kinetic energy of the grains was at most "//to_text(simulation%rest_energy, 3)//" J in "// &
         & to_text(steps_at_rest)//" steps"
       if (simulation%inflow%is_blocked(simulation%time)) why = why//", and grains that are still to enter found no place"
+      do b = 1, size(simulation%decomposition%boundaries)
+        if (still_moves(simulation, b)) why = why//"; boundary '"//simulation%decomposition%boundaries(b)%name//"' still moves"
+      end do
       return
     end if
     grains = simulation%n_grains - simulation%n_glued
@@ -121,6 +125,19 @@ contains
       end associate
     end do
   end function rests
+
+  !> Whether boundary `b` moves by a velocity that is given, or moves under a force and touches no grain.
+  pure logical function still_moves(simulation, b)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: b
+
+    associate (boundary => simulation%decomposition%boundaries(b))
+      still_moves = boundary%is_moved()
+      if (boundary%is_driven()) still_moves = still_moves .or. (norm2(boundary%velocity) > 0.0_dp .and. &
+        & .not. norm2(simulation%boundary_impulses(:, b)) > 0.0_dp)
+      still_moves = still_moves .and. boundary%touches()
+    end associate
+  end function still_moves
 
   !> Whether the boundary of stop_boundary is there: one that is removed has no place.
   pure logical function is_watched(simulation)

@@ -76,6 +76,22 @@ class AtRest(RunTestCase):
                 last = max(int(key.split("/")[2]) for key in results if key.endswith("/bodies/position"))
                 self.assertTrue(moved(results[f"/steps/{last}/bodies/position"][0]), results[f"/steps/{last}/bodies/position"])
 
+    def test_a_wall_on_its_way(self):
+        """It does not keep a run going, and the last words name it, whether a velocity or a force moves it; one that rests on the grain they do not."""
+        lid = {"name": "lid", "shape": "plane", "point": [0.0, 0.05], "normal": [0.0, -1.0]}
+        force = {"free": [False, True], "mass": 1.0, "force": [0.0, -1.0]}
+        for name, wall, told in (("velocity", {**lid, "velocity": [0.0, -0.1]}, True), ("force", {**lid, **force}, True),
+                                 ("still", lid, False), ("pressed", {**lid, **force, "point": [0.0, 0.02]}, False)):
+            place = self.here(f"wall_{name}")
+            os.makedirs(place)
+            write(os.path.join(place, "ball.csv"), "id,x,y,radius\n1,0,0.01,0.01\n")
+            run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "ball.csv"},
+                            "boundary": [{"shape": "plane", "normal": [0.0, 1.0]}, wall],
+                            "time": {"step": 1e-3, "steps": 100, "rest_energy": LOW}, "output": {"every": 0}}, directory=place)
+            self.assert_status(run, 0)
+            self.assertIn("at rest     after step 10 of 100: the kinetic energy of the grains was at most", run.stdout)
+            self.assertEqual("; boundary 'lid' still moves" in run.stdout, told, run.stdout[-600:])
+
     def test_a_ball_at_its_apex_is_not_at_rest(self):
         """It is slow for some steps of each bounce, which do not add up."""
         place = self.here("ball")

@@ -102,6 +102,23 @@ class Scales(RunTestCase):
         for text, value in zip(found.groups(), (10.0 * 1e-3 / 1e6, 0.1 * G * 1e-3, most)):
             self.assertAlmostEqual(float(text) / value, 1.0, delta=6e-3)
 
+    def test_table_that_turns_within_steps(self):
+        """A table of a drive or of gravity whose ups and downs fall between steps is warned of; with steps that follow it it is not."""
+        wave = "".join(f"{0.005 * k},{(k % 2) * 9.81}\n" for k in range(41))
+        for key, column, name in (("boundary", "vx", "boundary 'plate': its table"), ("scene", "gx", "&scene gravity_table = 'wave.csv'")):
+            for step, told in ((0.01, True), (0.0025, False)):
+                case = {"scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [2, 1], "radius_min": 0.05, "radius_max": 0.05},
+                        "boundary": [{"name": "plate", "shape": "plane", "normal": [0.0, 1.0], "point": [0.0, -0.05]}],
+                        "time": {"step": step, "steps": int(0.1 / step)}}
+                (case["boundary"][0] if key == "boundary" else case["scene"])["table" if key == "boundary" else "gravity_table"] = "wave.csv"
+                place = self.here(f"{key}{step}")
+                os.makedirs(place)
+                write(os.path.join(place, "wave.csv"), f"time,{column}\n{wave}")
+                run = run_case(case, directory=place, options=("--check",))
+                self.assert_status(run, 0)
+                self.assertEqual(f"warning     {name} turns within steps: they keep 0 % of its ups and downs; a smaller &time step keeps more" in run.stdout,
+                                 told, run.stdout)
+
     def test_ranks(self):
         said = [[line for line in self.check_case(SHEAR, {"solver": {"method": "nscdd", "tolerance": 0.1}, "decomposition": {"subdomains": 3}},
                                                   ranks=ranks).splitlines() if re.match("scales|warning|            ", line)]

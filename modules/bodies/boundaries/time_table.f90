@@ -21,6 +21,7 @@ module gravier_time_table
     procedure :: read => time_table_read
     procedure :: at => time_table_at
     procedure :: changes_after => time_table_changes_after
+    procedure :: kept_variation => time_table_kept_variation
     procedure :: digest => time_table_digest
   end type time_table_t
 
@@ -185,6 +186,42 @@ contains
       end do
     end do
   end function time_table_changes_after
+
+  !> What steps keep of the ups and downs of the quantities until some step, for the quantity that loses most: the sum of the
+  !> changes from step to step over that of the changes from row to row. 1 where nothing turns within a step. The table has been read.
+  pure real(dp) function time_table_kept_variation(self, step, steps) result(share)
+    class(time_table_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: step
+    integer, intent(in) :: steps
+    !> of a row and of the end, in steps: roundings of times are none
+    real(dp), parameter :: rounding = 1.0e-6_dp
+    real(dp) :: kept, whole, last, sample, from, to
+    integer :: k, row, n
+
+    share = 1.0_dp
+    do k = 1, size(self%has)
+      if (.not. self%has(k)) cycle
+      kept = 0.0_dp
+      whole = 0.0_dp
+      last = self%at(k, 0.0_dp)
+      do row = 1, size(self%time) - 1
+        from = max(self%time(row), 0.0_dp)
+        to = min(self%time(row + 1), steps*step)
+        if (.not. to > from) cycle
+        whole = whole + abs(self%at(k, to) - self%at(k, from))
+        ! between two rows the first and the last step count
+        do n = 1, 2
+          if (n == 1) sample = real(ceiling(from/step - rounding, i8), dp)
+          if (n == 2) sample = real(floor(to/step + rounding, i8), dp)
+          if (sample*step < from - rounding*step .or. sample*step > to + rounding*step) cycle
+          kept = kept + abs(self%at(k, sample*step) - last)
+          last = self%at(k, sample*step)
+        end do
+      end do
+      if (whole > 0.0_dp) share = min(share, kept/whole)
+    end do
+  end function time_table_kept_variation
 
   !> A number that tells tables of other columns, times or values apart; the table has been read.
   pure integer(i8) function time_table_digest(self) result(digest)

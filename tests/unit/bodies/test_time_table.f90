@@ -12,6 +12,7 @@ program test_time_table
   call MPI_Init()
   call test_values()
   call test_one_row()
+  call test_variation()
   call test_many_rows()
   call test_refusals()
   call finish_checks()
@@ -69,6 +70,29 @@ contains
     call check_close(table%at(2, 2.0_dp), 5.0_dp, 0.0_dp, "one row, then")
     call check_close(table%at(2, 9.0_dp), 5.0_dp, 0.0_dp, "one row, after")
   end subroutine test_one_row
+
+  !> A triangle of period 2 that begins at 0: steps of 1/2 and 1 keep its ups and downs, those of 2 none of them, and those of 3/2 a
+  !> third of them. A jump between two steps is kept; what is behind the last step does not count.
+  subroutine test_variation()
+    type(error_t), allocatable :: error
+
+    call read_table("time,vx,omega"//newline//"0,0,1"//newline//"1,1,1"//newline//"2,0,1"//newline//"3,1,1"//newline//"4,0,1"// &
+      & newline//"5,1,1"//newline//"6,0,1"//newline, error)
+    call check(.not. allocated(error), "a triangle")
+    if (allocated(error)) return
+    call check_close(table%kept_variation(0.5_dp, 12), 1.0_dp, 1.0e-12_dp, "fine steps keep ups and downs")
+    call check_close(table%kept_variation(1.0_dp, 6), 1.0_dp, 1.0e-12_dp, "steps that are those of the rows do")
+    call check_close(table%kept_variation(2.0_dp, 3), 0.0_dp, 1.0e-12_dp, "steps of the period keep none")
+    ! 0, 1/2, 1, 1/2, 0
+    call check_close(table%kept_variation(1.5_dp, 4), 2.0_dp/6.0_dp, 1.0e-12_dp, "steps between keep a part")
+    call check_close(table%kept_variation(2.0_dp, 0), 1.0_dp, 1.0e-12_dp, "no step loses nothing")
+    call read_table("time,vx"//newline//"1.1,0"//newline//"1.2,3"//newline//"9,3"//newline//"9.1,0"//newline//"9.2,3"// &
+      & newline, error)
+    call check(.not. allocated(error), "a jump")
+    if (allocated(error)) return
+    call check_close(table%kept_variation(0.5_dp, 8), 1.0_dp, 1.0e-12_dp, "a jump between two steps is kept")
+    call check_close(table%kept_variation(0.5_dp, 40), 1.0_dp/3.0_dp, 1.0e-12_dp, "a dip between two steps is not")
+  end subroutine test_variation
 
   !> More rows than there is room for at first: a square of the time, exact at rows, off by 1/4 between them.
   subroutine test_many_rows()
