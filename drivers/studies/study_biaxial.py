@@ -215,10 +215,11 @@ def main():
     strain, lateral, top, side, sine, fraction, number = stress_strain(options.out / "shear/results.h5", size, volume)
     write_csv(options.out / "study_biaxial.csv", {"axial_strain": strain, "lateral_strain": lateral, "axial_stress": top,
         "lateral_stress": side, "sin_phi": sine, "solid_fraction": fraction, "coordination": number})
-    smooth = np.convolve(sine, np.ones(9) / 9.0, "valid")
     history = read_history(options.out / "shear")
     # the volume has become constant
     late = strain > 0.75 * options.strain
+    # a peak is one before that
+    smooth = np.convolve(sine[~late], np.ones(9) / 9.0, "valid")
     mean_top, mean_side = top[late].mean(), side[late].mean()
     summary.update(sin_phi_peak=smooth.max(), sin_phi=sine[late].mean(), sin_phi_deviation=sine[late].std(),
                    sin_phi_mean_stresses=(mean_top - mean_side) / (mean_top + mean_side),

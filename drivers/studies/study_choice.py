@@ -29,6 +29,8 @@ ACCURACIES = (0.3, 0.1, 0.03)
 RIGHT_VOLUME, RIGHT = 0.1, 0.02
 #: standard errors that make the uncertainty of a deviation, and those that the closing table allows to each of its forty
 UNCERTAIN, FAR = 2.0, 3.0
+#: how many times what is right three standard errors may be: figures that scatter more say nothing
+CEILING = 5.0
 #: share of the solves that may miss their accuracy
 MISSED = 0.0025
 #: by which places of grains differ between runs of one setting, in mean diameters. With a hundredth of this the runs stay alike for so long
@@ -200,9 +202,10 @@ def accepted(rows):
         if row["accuracy"] > 0.1:
             continue
         case = f"{row['scene']}, step {1e3 * row['step']:g} ms, accuracy {row['accuracy']:g}"
+        right = right_within(row["quantity"])
         table.near(f"{case}: deviation of {row['quantity']} [%]", 100.0 * row["deviation"], 0.0,
-                   100.0 * max(right_within(row["quantity"]), FAR * row["standard_error"]),
-                   f"{page}: 2 % (a change of volume: 10 %), or three standard errors")
+                   100.0 * max(right, min(FAR * row["standard_error"], CEILING * right)),
+                   f"{page}: 2 % (a change of volume: 10 %), or three standard errors; at most {CEILING:g} times as much")
     for name in dict.fromkeys(row["scene"] for row in rows):
         table.add(f"{name}: share of the solves that missed, the most of all settings [%]", 100.0 * max(row["missed"] for row in rows if
                   row["scene"] == name), None, 100.0 * MISSED, f"{page}: up to 0.25")

@@ -62,7 +62,8 @@ def settle(out, dimension, count, steps, **scene):
 
 def first_kept(trace, bound):
     """The first iteration looked at from which on the estimate stays at or below the bound; '-' where there is none."""
-    late = [k for k, (_, _, error) in enumerate(trace) if error > bound]
+    # an estimate that is no number is above any bound
+    late = [k for k, (_, _, error) in enumerate(trace) if not error <= bound]
     after = late[-1] + 1 if late else 0
     return trace[after][0] if after < len(trace) else "-"
 

@@ -20,7 +20,7 @@ sys.path[:0] = [str(SOURCE / "tests" / "hard"), str(SOURCE / "tests" / "support"
 import gravier_runs  # noqa: E402
 from hard_cases import cases, disagreement, methods_of, play  # noqa: E402
 from oracle_table import Bounds  # noqa: E402
-from study_support import sized  # noqa: E402
+from study_support import emptied, sized  # noqa: E402
 from whole_file import whole_file  # noqa: E402
 
 COLUMNS = ["case", "method", "ranks", "subdomains", "steps", "iterations", "residual", "energy_change", "overlap", "status", "wrong"]
@@ -52,7 +52,7 @@ def study(options, case):
         several = groups["solver"]["method"] != "nlgs" and (not options.several or title in options.several)
         for ranks in options.ranks if several and wanted else options.ranks[:1]:
             directory = options.out / "runs" / re.sub(r"\W+", "_", f"{case.name} {title} {ranks}")
-            shutil.rmtree(directory, ignore_errors=True)
+            emptied(directory)
             long = case.long > 0 and title in LONG and ranks == 1 and not options.short
             played = play(case, title, groups, ranks, str(directory), long)
             wrong = played.complaints()
@@ -150,6 +150,12 @@ def main():
     options.broken, options.apart = [], []
     options.out.mkdir(parents=True, exist_ok=True)
     chosen = [case for name, case in cases().items() if re.search(options.cases, name) and not (options.quick and case.slow)]
+    if not chosen:
+        parser.error(f"--cases {options.cases}: no case has a name that matches")
+    titles = {title for case in chosen for title in methods_of(case)}
+    unknown = [title for title in options.methods or [] if title not in titles]
+    if unknown:
+        parser.error(f"--methods {unknown[0]}: expected one of {'; '.join(sorted(titles))}")
     found = gravier_runs.each(study, [(options, case) for case in chosen], options.workers)
     made = [r for several in found for r in several]
     rows = joined(options.out / "hard_cases.csv", made)

@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 
 from oracle_table import Bounds
-from study_support import BINARIES, ENVIRONMENT, SOURCE, sized, write_csv
+from study_support import BINARIES, ENVIRONMENT, SOURCE, emptied, sized, write_csv
 
 from one_line import OneLineParser
 
@@ -34,7 +34,7 @@ def value_of(text, names):
     try:
         # products and quotients of numbers, as `1./60`
         return float(eval(found[-1].lower().replace("d", "e"), {"__builtins__": {}})) if found else None
-    except (SyntaxError, TypeError, ZeroDivisionError):
+    except (NameError, SyntaxError, TypeError, ZeroDivisionError):
         return None
 
 
@@ -115,8 +115,7 @@ def judge(folder, root, options):
     row = {"example": name, "bodies": "", "imports": "no", "steps": "", "of": "", "status": "", "lacks": lacks}
     if source is None:
         return row
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
+    emptied(place)
     step, wanted, steps, refused, made = convert(source, place, options)
     row["of"] = f"{wanted:g}" if wanted else "not said"
     if refused:

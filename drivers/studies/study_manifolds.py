@@ -57,6 +57,8 @@ def main():
     parser.add_argument("--seed", type=int, default=101)
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
+    if options.jobs < 1:
+        parser.error(f"--jobs {options.jobs}: expected 1 or more")
     count = options.count or (200_000 if options.quick else 10_000_000)
     jobs = [start(count//options.jobs, options.seed + k) for k in range(options.jobs)]
     said = [job.communicate()[0] for job in jobs]
@@ -72,7 +74,9 @@ def main():
     print(f"{'':<52} {'measured':>12} {'accepted':>12}   within")
     for family in results[0][0]:
         for column, accepted in ACCEPTED.items():
-            worst = max(families[family][column] for families, _, _ in results)
+            found = [families[family][column] for families, _, _ in results]
+            # a number that is none counts as the worst
+            worst = max(found) if all(value == value for value in found) else float("nan")
             row(f"{family}: error of {column}", f"{worst:.1e}", f"{accepted:.0e}", worst <= accepted)
     total, jumps = (sum(lines[k] for _, lines, _ in results) for k in (0, 1))
     row(f"lines of places, {total}: those with a jump", str(jumps), f"{JUMPS*total:.1f}", jumps <= JUMPS*total)

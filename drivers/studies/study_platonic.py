@@ -8,12 +8,11 @@ fraction is measured in the middle of the height: the share of random points the
 found for solids that were poured and for solids that were shaken. --quick pours fewer of them. Leaves DIR/study_platonic.csv and the runs.
 Exit status: 0 all within; 1 one is not."""
 import argparse
-import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
-from study_support import gravier, run, write_csv
+from study_support import emptied, gravier, run, write_csv
 
 from gravier.shapes import axes_of
 from one_line import OneLineParser
@@ -98,7 +97,7 @@ def main():
     for solid in options.solids:
         _, loose, dense, densest = SOLIDS[solid]
         folder = options.out / solid
-        shutil.rmtree(folder, ignore_errors=True)
+        emptied(folder)
         made = pour(solid, count, width, folder)
         measured, error, height = solid_fraction(made, width, np.random.default_rng(2010))
         history = made.history()

@@ -116,8 +116,14 @@ def compare(table, found):
     for number, mu, phi, mu_error, phi_error in found[3]:
         slow = number <= 1e-2
         for key, value, error in (("mu", mu, mu_error), ("phi", phi, phi_error)):
-            expected = SPHERES[key] if slow else ""
-            table.add("spheres", f"{key} at I = {number:g}, standard error {error:.0e}", value, expected, None, NEAR[key] if slow else None)
+            words = f"{key} at I = {number:g}, standard error {error:.0e}"
+            if slow:
+                table.add("spheres", words, value, SPHERES[key], None, NEAR[key])
+            else:
+                # a faster flow has more friction, and is not denser; how much is not known as well
+                off = SPHERES[key] - value if key == "mu" else value - SPHERES[key]
+                table.add("spheres", f"{words}, {'above' if key == 'mu' else 'below'} that of slow flow", value, SPHERES[key],
+                          off if np.isnan(value) else max(off, 0.0), NEAR[key])
     if len(found[3]) > 3:
         rows = np.array(found[3])
         mu_0, s, n, error = power_law(rows[:, 0], rows[:, 1], rows[:, 3])
@@ -133,7 +139,12 @@ def main():
     options = parser.parse_args()
     if options.least and len(options.least) > 2:
         parser.error("--least takes one or two numbers")
+    if options.least and options.quick:
+        parser.error("--quick has inertial numbers of its own; expected no --least beside it")
     least = dict(zip((2, 3), 2 * options.least)) if options.least else LEAST
+    for dimension, taken in NUMBERS.items():
+        if least[dimension] > max(taken):
+            parser.error(f"--least {least[dimension]:g}: expected at most {max(taken):g}")
     options.out.mkdir(parents=True, exist_ok=True)
     found = {}
     for dimension in (2, 3):

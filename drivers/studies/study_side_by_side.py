@@ -24,7 +24,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from oracle_table import Bounds
-from study_support import BINARIES, ENVIRONMENT, plt, read_history, sized, states, write_csv
+from study_support import BINARIES, ENVIRONMENT, emptied, plt, read_history, sized, states, write_csv
 
 import gravier
 from one_line import OneLineParser
@@ -96,8 +96,7 @@ def settled(example, place, options):
 
 
 def by_lmgc90(example, place, options, steps):
-    shutil.rmtree(place, ignore_errors=True)
-    shutil.copytree(example, place)
+    shutil.copytree(example, emptied(place), dirs_exist_ok=True)
     for script in [*place.glob("command*.py"), *place.glob("run*.py")]:
         text = script.read_text(encoding="latin-1")
         script.write_text(re.sub(r"^(\s*nb_?steps?\s*=\s*)\d+", rf"\g<1>{steps}", text, flags=re.MULTILINE), encoding="latin-1")
@@ -118,8 +117,7 @@ def by_lmgc90(example, place, options, steps):
 
 def by_gravier(example, place, options):
     """Run with every step written, then once for the seconds; with forces to start from once more without them."""
-    shutil.rmtree(place, ignore_errors=True)
-    place.mkdir(parents=True)
+    emptied(place)
     _, _, _, refused, _ = convert(example, place, options)
     if refused:
         sys.exit(f"study_side_by_side: {example.name} does not import: {refused}")

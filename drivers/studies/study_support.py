@@ -2,6 +2,7 @@
 import csv
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import time
@@ -100,6 +101,23 @@ def read_bodies(path):
 
 
 # ---- runs
+
+#: the file that says of a directory that a study has made it
+MARK = ".made_by_a_study"
+
+
+def emptied(directory):
+    """An empty directory for a study. What an older study has left there goes; a directory with anything else ends the study with status 2."""
+    directory = Path(directory)
+    if directory.exists() and not (directory.is_dir() and ((directory / MARK).exists() or not any(directory.iterdir()))):
+        print(f"{Path(sys.argv[0]).stem}: {directory}: there is something that no study has made, which is not replaced; expected another --out",
+              file=sys.stderr)
+        sys.exit(2)
+    shutil.rmtree(directory, ignore_errors=True)
+    directory.mkdir(parents=True)
+    (directory / MARK).touch()
+    return directory
+
 
 def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier"):
     """Run the program in `directory` on the groups {name: {key: value}} and boundaries [{key: value}]; seconds it took."""

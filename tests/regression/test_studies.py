@@ -4,7 +4,9 @@ import contextlib
 import io
 import os
 import re
+import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,11 +22,13 @@ import study_choice  # noqa: E402
 import study_collapse  # noqa: E402
 import study_drift  # noqa: E402
 import study_drum  # noqa: E402
+import study_error  # noqa: E402
 import study_hard  # noqa: E402
 import study_hopper  # noqa: E402
 import study_lmgc90  # noqa: E402
 import study_side_by_side  # noqa: E402
 import study_silo  # noqa: E402
+import study_support  # noqa: E402
 from oracle_table import Bounds  # noqa: E402
 
 #: studies that write nothing or, unless asked, only in a directory that goes
@@ -93,6 +97,12 @@ class Studies(unittest.TestCase):
 
 class ClosingTable(unittest.TestCase):
     """The table by which studies end, and those of single studies with values that are held and with one that is not."""
+
+    def scratch(self):
+        """A directory that goes with the test."""
+        place = tempfile.TemporaryDirectory(prefix="gravier-studies-")
+        self.addCleanup(place.cleanup)
+        return place.name
 
     def close(self, *rows):
         table = Bounds()
@@ -194,6 +204,8 @@ class ClosingTable(unittest.TestCase):
             return study_choice.accepted([{"scene": "settling", "step": 1e-3, "accuracy": 0.1, "quantity": "q",
                                            "standard_error": 0.015, **given}])
         self.breaks(judge, {"deviation": 0.04, "missed": 0.0}, {"deviation": 0.05, "missed": 0.01})
+        # figures that scatter too much say nothing
+        self.assertEqual(judged(judge, {"deviation": 1.9, "missed": 0.0, "standard_error": 0.7})[0], 1)
 
     def test_convergence(self):
         def of_newton(given):
@@ -223,13 +235,15 @@ class ClosingTable(unittest.TestCase):
             rows = [{**same, "method": method, "direction": direction, "to error 0.3": given[method], "to 0.001": ""}
                     for method, direction in (("nscdd", ""), ("nscdd_ep", "automatic"))]
             columns = [{"method": "NSCDD-EP, l = 1e4, all", "sweeps": "10", "subdomains": str(n), "iterations": found}
-                       for n, found in ((2, "8"), (16, given["columns"]), (64, "45"))]
+                       for n, found in ((2, given.get("fewest", "8")), (16, given["columns"]), (64, "45"))]
             return bounds_of_methods.accepted(rows, columns, {"disks": {"newton": given["apart"]}})
         good = {"nscdd": "74", "nscdd_ep": "24", "columns": "10", "apart": 1e-3}
         self.breaks(judge, good, {"nscdd_ep": "50", "columns": "20", "apart": 1e-2})
         # where one of both does not get there
         self.assertEqual(judged(judge, {**good, "nscdd": ""})[0], 0)
         self.assertEqual(judged(judge, {**good, "nscdd_ep": ""})[0], 1)
+        # columns no solve of which ends
+        self.assertEqual(judged(judge, {**good, "columns": "", "fewest": ""})[0], 1)
 
     def test_hard(self):
         def judge(given):
@@ -239,6 +253,33 @@ class ClosingTable(unittest.TestCase):
                                        [{"case": "tower, light on heavy", "method": "nlgs", "ranks": 1, "status": given["status"]}])
         self.breaks(judge, {"broken": False, "apart": False, "status": "converged"},
                     {"broken": True, "apart": True, "status": "3 of 10 steps"})
+
+    def test_nothing_compared(self):
+        """A study of cases that there are none of is refused; estimates none of which has a true error beside it are a failure."""
+        place = self.scratch()
+        for arguments, words in ((("--cases", "nosuch"), "--cases nosuch: no case has a name that matches"),
+                                 (("--cases", "tower", "--methods", "nosuch"), "--methods nosuch: expected one of ")):
+            done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/studies/study_hard.py"), "--out", place, *arguments],
+                                  capture_output=True, text=True, check=False)
+            self.assertEqual(done.returncode, 2, done.stdout)
+            self.assertIn(words, done.stderr)
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.assertIn("nothing is compared", " ".join(study_error.judge_estimate([], Path(place))))
+            self.assertIn("no scene has it in its name", " ".join(study_error.study_estimate(Path(place), True, "nosuch")))
+
+    def test_directories_of_others(self):
+        """What no study has made stays; a directory of an older study is emptied."""
+        place = Path(self.scratch())
+        (place / "cube").mkdir(parents=True)
+        (place / "cube/mine.txt").write_text("mine")
+        done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/studies/study_platonic.py"), "--out", str(place), "--solids", "cube", "--count", "20"],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, len(done.stderr.splitlines())), (2, 1), done.stderr)
+        self.assertIn("cube: there is something that no study has made, which is not replaced; expected another --out", done.stderr)
+        self.assertEqual([path.name for path in (place / "cube").iterdir()], ["mine.txt"])
+        made = study_support.emptied(place / "own")
+        (made / "older.txt").write_text("older")
+        self.assertEqual([path.name for path in study_support.emptied(made).iterdir()], [study_support.MARK])
 
     def test_lmgc90(self):
         def judge(given):

@@ -38,6 +38,13 @@ class Rheology(StudyTestCase):
             return len(table.misses)
         self.assertEqual([misses(0.0, 0.0), misses(0.049, -0.019), misses(0.051, 0.0), misses(0.0, 0.021)], [0, 0, 2, 2])
 
+        def of_fast_spheres(mu, phi):
+            table = oracle_table.Table(quiet=True)
+            study_rheology.compare(table, {2: [], 3: [(0.1, mu, phi, 0.01, 0.001)]})
+            return len(table.misses)
+        self.assertEqual([of_fast_spheres(0.411, 0.55), of_fast_spheres(0.30, 0.55), of_fast_spheres(0.411, 0.62), of_fast_spheres(np.nan, np.nan)],
+                         [0, 1, 1, 2])
+
     def test_quick(self):
         """Friction and solid fraction of disks are those of the publication; the status says what the table does."""
         done = self.run_study("--out", "out", "--quick")
@@ -45,7 +52,7 @@ class Rheology(StudyTestCase):
             rows = list(csv.DictReader(file))
         self.assertEqual(done.returncode, int(any(row["within"] == "NO" for row in rows)), done.stderr)
         self.assertEqual([row["oracle"] for row in rows], ["disks"] * 4 + ["spheres"] * 2)
-        self.assertEqual([row["within"] for row in rows], ["yes"] * 4 + [""] * 2, rows)
+        self.assertEqual([row["within"] for row in rows], ["yes"] * 6, rows)
         self.assertTrue(os.path.exists(self.here("out", "study_rheology.png")))
 
     def test_steps(self):
@@ -54,7 +61,7 @@ class Rheology(StudyTestCase):
             self.assertAlmostEqual(study_rheology.step_of(number), step, places=6)
 
     def test_refused(self):
-        for arguments in (("--slow",), ("--least", "1e-3", "1e-3", "1e-3"), ("--least", "slow")):
+        for arguments in (("--slow",), ("--least", "1e-3", "1e-3", "1e-3"), ("--least", "slow"), ("--least", "5"), ("--quick", "--least", "1e-3")):
             done = self.run_study(*arguments)
             self.assertEqual(done.returncode, 2)
             self.assertEqual(done.stderr.count("\n"), 1)
