@@ -58,18 +58,20 @@ contains
   !> g h; without gravity the root mean square velocity that bodies would have without contacts [m/s]. Collective.
   real(dp) function scale_of(simulation) result(scale)
     type(simulation_t), intent(in) :: simulation
-    real(dp) :: parts(1, size(simulation%problem%sub)), sums(1)
+    real(dp) :: parts(1, size(simulation%problem%sub)), sums(1), mass
     integer :: s
 
     scale = simulation%velocity_scale%value
-    if (scale > 0.0_dp) return
+    mass = mass_of(simulation%problem)
+    ! without a grain in contact there is nothing to compare
+    if (scale > 0.0_dp .or. .not. mass > 0.0_dp) return
     do s = 1, size(simulation%problem%sub)
       associate (sub => simulation%problem%sub(s))
         parts(1, s) = sub%product_of(sub%v_free, sub%v_free)
       end associate
     end do
     call simulation%problem%comm%sum_parts(parts, sums)
-    scale = sqrt(sums(1)/mass_of(simulation%problem))
+    scale = sqrt(sums(1)/mass)
   end function scale_of
 
   !> Mass of the grains in contact, each counted once [kg]. Collective.

@@ -79,11 +79,15 @@ def pieces(case, body, contactor):
     half, thick = contactor.size(1, "axe1"), contactor.size(d, f"axe{d}")
     normal, along = frame[:, -1], frame[:, 0] * half
     height = (case.centres - centre) @ normal
-    sides = [side for side in (1.0, -1.0) if np.any(side * height > 0.0)]
+    # both where all grains are in the middle of the wall
+    sides = [side for side in (1.0, -1.0) if np.any(side * height > 0.0)] or [1.0, -1.0]
     across = frame[:, 1] * contactor.size(2, "axe2") if d == 3 else 0.0 * along
-    spans = spans_period(case, normal, np.abs(along) + np.abs(across))
+    spanned = spanned_axes(case, normal, np.abs(along) + np.abs(across))
+    spans = bool(spanned)
     if spans and not case.planes and len(sides) == 1:
-        case.remarks.append(f"body {body.rank} {shape}: it is as wide as the period, and becomes an endless plane")
+        others = [axis for k, axis in enumerate("xyz"[:d]) if axis not in spanned and abs(normal[k]) < 1.0 - ROUND]
+        beyond = f", along {' and '.join(others)} too, where it has edges" if others else ""
+        case.remarks.append(f"body {body.rank} {shape}: it is as wide as the period along {' and '.join(spanned)}, and becomes an endless plane{beyond}")
     endless = (case.planes or spans) and len(sides) == 1
     found = []
     for side in sides:
@@ -106,10 +110,10 @@ def pieces(case, body, contactor):
     return found, ends
 
 
-def spans_period(case, normal, half):
-    """Does a flat wall of these half widths reach round a periodic axis along which it lies?"""
-    return any(length > 0.0 and abs(across) < ROUND and 2.0 * width >= length * (1.0 - ROUND)
-               for length, across, width in zip(case.period, normal, half))
+def spanned_axes(case, normal, half):
+    """The periodic axes, along which a flat wall of these half widths lies, that it reaches round."""
+    return [axis for axis, length, across, width in zip("xyz", case.period, normal, half)
+            if length > 0.0 and abs(across) < ROUND and 2.0 * width >= length * (1.0 - ROUND)]
 
 
 def add_wall(case, body):

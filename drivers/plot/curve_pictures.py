@@ -206,10 +206,16 @@ def region_with_bins(run, name, step):
     return name, "xyz".index(held[name]["axis"])
 
 
+#: columns that a bin has only with grains inside, and the one that tells whether it has
+OF_GRAINS = {"velocity": "solid_fraction", "granular_temperature": "solid_fraction", "contacts_per_grain": "grains"}
+
+
 def components(rows, column, dimension):
-    """Curves of a column over the bins: {name: values (bins)}."""
-    if column == "velocity":
-        return {"xyz"[a]: rows.velocity[:, a] for a in range(dimension)}
+    """Curves of a column over the bins: {name: values (bins)}, nan where a bin has no grains whose mean it would be."""
+    if column in OF_GRAINS:
+        there = rows[OF_GRAINS[column]] > 0.0
+        values = numpy.where(there[:, None] if rows[column].ndim == 2 else there, rows[column], numpy.nan)
+        return {"xyz"[a]: values[:, a] for a in range(dimension)} if column == "velocity" else {None: values}
     if column == "stress":
         pairs = [(a, a) for a in range(dimension)] + [(0, dimension - 1)]
         return {"xyz"[a] + "xyz"[b]: rows.stress[:, a, b] for a, b in pairs}
@@ -246,20 +252,28 @@ def draw_profile(run, name, steps, columns, mean):
     return figure
 
 
+def mean_of(rows):
+    """Means over those states in which a bin has a value."""
+    rows = numpy.array(rows)
+    count = numpy.isfinite(rows).sum(axis=0)
+    return numpy.where(count > 0, numpy.nansum(rows, axis=0) / numpy.maximum(count, 1), numpy.nan)
+
+
 def draw_column(axes, run, tables, column, axis, mean):
     """Curves of a column: a colour a component where there is one state, else a colour a state and a dash a component."""
     upright = axis == run.dimension - 1
     rows = [components(table, column, run.dimension) for table in tables]
     centres = [table.centre[:, axis] for table in tables]
     if mean:
-        rows = [{key: numpy.mean([row[key] for row in rows], axis=0) for key in rows[0]}]
+        rows = [{key: mean_of([row[key] for row in rows]) for key in rows[0]}]
         centres = [numpy.mean(centres, axis=0)]
     for k, (centre, row) in enumerate(zip(centres, rows)):
         for c, (key, values) in enumerate(row.items()):
             colour = LINES[c % len(LINES)] if len(rows) == 1 else TIMES(k / (len(rows) - 1))
             x, y = (values, centre) if upright else (centre, values)
             axes.plot(x, y, STYLES[c % len(STYLES)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
-    shown = numpy.concatenate([values for row in rows for values in row.values()])
+    shown = numpy.concatenate([[0.0], *(values for row in rows for values in row.values())])
+    shown = shown[numpy.isfinite(shown)][1:] if numpy.isfinite(shown).sum() > 1 else shown[:1]
     unit = "N/m" if run.dimension == 2 else "Pa"
     label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)
     fit_axis(axes.xaxis if upright else axes.yaxis, shown, label, logarithms=False)

@@ -634,6 +634,18 @@ class Import(RunTestCase):
         _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)))
         self.assertIn("body 2 DISKx: no grain sees it, left out", message)
 
+    def test_a_wall_through_the_middle_of_a_grain(self):
+        """A wall on whose middle all grains lie has both of its sides."""
+        for dimension, shape, wall, half in ((2, "DISKx", "JONCx", {"axe1": 0.5, "axe2": 0.01}),
+                                             (3, "SPHER", "PLANx", {"axe1": 0.6, "axe2": 0.3, "axe3": 0.01})):
+            rigid = f"RBDY{dimension}"
+            side = [2.0] + [0.0] * (dimension - 1)
+            ground = body(dimension, 2, [0.0] * dimension, [(wall, "WALLx", values(**half))])
+            laws = LAW + SEE.format(rigid, shape, "BLUEx", shape, "BLUEx") + SEE.format(rigid, shape, "BLUEx", wall, "WALLx")
+            grain = body(dimension, 1, side, [(shape, "BLUEx", values(byrd=0.05))])
+            folder, _ = self.convert(self.box(dimension, grain + ground, laws, still(dimension, 2)))
+            self.assertEqual(self.case_of(folder).count("shape = 'segment'" if dimension == 2 else "shape = 'rectangle'"), 2)
+
     def test_a_ground_as_wide_as_the_period(self):
         """A ground that reaches round the cell is a plane. One between grains above and below has two sides: they have no ends where the ground
         is as long as the period, and carry the grain above; a longer one is refused."""
@@ -646,7 +658,8 @@ class Import(RunTestCase):
             laws = LAW + SEE.format(rigid, shape, "BLUEx", shape, "BLUEx") + SEE.format(rigid, shape, "BLUEx", wall, "WALLx")
             period = ("--period", "1.0", *["0.0"] * (dimension - 1))
             folder, notes = self.convert(self.box(dimension, grain + ground, laws, still(dimension, 2)), *period)
-            self.assertIn(f"note: body 2 {wall}: it is as wide as the period, and becomes an endless plane\n", notes)
+            self.assertIn(f"note: body 2 {wall}: it is as wide as the period along x, and becomes an endless plane"
+                          f"{', along y too, where it has edges' if dimension == 3 else ''}\n", notes)
             self.assertEqual(self.case_of(folder).count("shape = 'plane'"), 1)
             _, forces = self.run_case(folder)
             weight = 2500.0 * G * (math.pi * 0.05**2 if dimension == 2 else 4.0 / 3.0 * math.pi * 0.05**3)

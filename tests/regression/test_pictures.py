@@ -295,6 +295,15 @@ class Pictures(RunTestCase):
         with self.assertRaisesRegex(PictureError, "no single region has bins; expected one of none, the case has none"):
             curve_pictures.draw_profile(self.cylinder, None, None, ["pressure"], False)
 
+    def test_empty_bins(self):
+        """A bin without grains has no velocity: means leave it out, and curves have a gap."""
+        def rows(fractions, speeds):
+            return gravier.results.Table(solid_fraction=np.array(fractions), velocity=np.array([[0.0, speed] for speed in speeds]), grains=np.array(fractions))
+        found = [curve_pictures.components(row, "velocity", 2)["y"] for row in (rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), rows([0.5, 0.1, 0.0], [-2.0, -3.0, 0.0]))]
+        np.testing.assert_array_equal(found[0], [-1.0, np.nan, np.nan])
+        np.testing.assert_array_equal(curve_pictures.mean_of(found), [-1.5, -3.0, np.nan])
+        np.testing.assert_array_equal(curve_pictures.components(rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), "solid_fraction", 2)[None], [0.5, 0.0, 0.0])
+
     @unittest.skipUnless(VTK, "NO VTK: no python3 with vtk; set GRAVIER_VTK_PYTHON")
     def test_by_vtk(self):
         """A scene in 2D fills its picture, with a legend of the colours beside it."""
