@@ -155,8 +155,20 @@ class Package(RunTestCase):
             gravier.run(base, self.here("none"), ranks=0)
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
             list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
-        with self.assertRaisesRegex(gravier.CaseError, "&boundary name: stands several times"):
-            list(gravier.study(base, {("boundary", "name"): ["x"]}, self.here("refused")))
+        # one of several groups, by its name or its number
+        several = {**base, "boundary": [{**GROUND, "name": "ground"}, {**GROUND, "name": "lower", "point": [0.0, -1.0]}]}
+        for which in ("lower", 2):
+            with self.assertWarnsRegex(UserWarning, "run_3, run_4 of an older study stay; this one has run_1 to run_2$"):
+                for point, place, status in gravier.study(several, {("boundary", which, "friction"): [0.1, 0.7]}, self.here("study")):
+                    case = gravier.Run(place / "results").case["boundary"]
+                    self.assertEqual((case[1]["friction"], case[0].get("friction"), status), (point["boundary", which, "friction"], None, 0))
+        self.assertNotIn("friction", several["boundary"][1])
+        for what, words in ((("boundary", "name"), r"&boundary name: the group stands several times; expected \('boundary', name, 'name'\)"),
+                            (("boundary", "lid", "friction"), "&boundary 'lid': no group of this name or number; expected one of 'ground', 'lower'"),
+                            (("boundary", 3, "friction"), "&boundary 3: no group of this name or number"),
+                            (("boundary", "lower", "table", "friction"), "expected \\(group, key\\), or \\(group, name, key\\)")):
+            with self.assertRaisesRegex(gravier.CaseError, words):
+                list(gravier.study(several, {what: [0.5]}, self.here("refused")))
 
     def test_a_run_beside_another(self):
         """A directory where a run is under way is refused, and what the first one has written stays."""

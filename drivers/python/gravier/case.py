@@ -3,6 +3,7 @@ import itertools
 import os
 import re
 import subprocess
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -213,14 +214,35 @@ def run_alone(groups, directory, ranks, program):
 
 def study(base, changes, directory, ranks=1):
     """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
-    `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). Groups that stand
-    several times cannot be changed."""
-    for number, values in enumerate(itertools.product(*changes.values()), 1):
+    `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
+    times is (group, name, key), with the `name` of the group, or its number from 1. Warns of runs that an older, larger study has left."""
+    points = list(itertools.product(*changes.values()))
+    older = sorted(int(place.name[4:]) for place in Path(directory).glob("run_*") if place.name[4:].isdigit() and int(place.name[4:]) > len(points))
+    if older:
+        warnings.warn(f"{directory}: {', '.join(f'run_{number}' for number in older)} of an older study stay; this one has run_1 to run_{len(points)}",
+                      stacklevel=2)
+    for number, values in enumerate(points, 1):
         point = dict(zip(changes, values))
-        groups = {group: keys if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
-        for (group, key), value in point.items():
-            if isinstance(groups.setdefault(group, {}), list):
-                raise CaseError(f"&{group} {key}: stands several times; expected a group that stands once")
-            groups[group][key] = value
+        groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
+        for what, value in point.items():
+            _group_of(groups, *what)[what[-1]] = value
         place = Path(directory) / f"run_{number}"
         yield point, place, run(groups, place, ranks)
+
+
+def _group_of(groups, group, *rest):
+    """The keys of a group, of one that stands several times by its name or number."""
+    found = groups.setdefault(group, {})
+    *which, key = rest
+    if len(which) > 1:
+        raise CaseError(f"{(group, *rest)}: expected (group, key), or (group, name, key) of a group that stands several times")
+    several = found if isinstance(found, list) else [found]
+    if which:
+        own = [one for number, one in enumerate(several, 1) if which[0] in (number, one.get("name"))]
+        if len(own) != 1:
+            known = ", ".join(repr(one.get("name", number)) for number, one in enumerate(several, 1))
+            raise CaseError(f"&{group} {which[0]!r}: {'no' if not own else 'more than one'} group of this name or number; expected one of {known}")
+        return own[0]
+    if isinstance(found, list):
+        raise CaseError(f"&{group} {key}: the group stands several times; expected ('{group}', name, '{key}'), with the name or number of one of them")
+    return found
