@@ -289,7 +289,7 @@ contains
     end do
     figures%max_overlap = self%comm%highest(figures%max_overlap)
     if (self%physics%laws%yields) call measure_springs(self%problem, self%tally%deformation, self%tally%stiffest)
-    if (self%decomposition%no > 0) call figures%deep%find(self%decomposition, self%halo, self%problem)
+    call figures%deep%find(self%decomposition, self%halo, self%problem, self%tally%deformation)
     self%largest_overlap = figures%max_overlap
     self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &

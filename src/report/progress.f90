@@ -16,7 +16,7 @@ module gravier_progress
   !> what the closing line calls them; a note is not counted there
   character(len=*), parameter :: kind_names(8) = [character(len=44) :: "solves above the tolerance", &
     & "grains too fast for the step", "search directions lowered", "Nesterov momentum suspended", "relaxation factors lowered", &
-    & "partitions refused", "springs too stiff for the step", "contacts pressed deep into thin bodies"]
+    & "partitions refused", "springs too stiff for the step", "contacts pressed deep into bodies"]
   !> said in full, of each kind
   integer(i8), parameter :: first_ones = 5
   !> lines of steps that are always written

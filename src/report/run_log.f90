@@ -405,8 +405,9 @@ contains
       & fast_warning(simulation, figures%fast, simulation%step), error)
     if (figures%deep%number > 0) call warn(self, warn_deep, figures%deep%number, "warning     "// &
       & counted(figures%deep%number, "contact")// &
-      & " overlap by a quarter of a thickness and more in step "//to_text(simulation%step)//", at most by "// &
-      & to_text(0.5_dp*figures%deep%deepest, 2)//" of it: thin bodies may come out on the other side", error)
+      & trim(merge(" overlaps", " overlap ", figures%deep%number == 1))//" by a quarter of a thickness and more in step "// &
+      & to_text(simulation%step)//", at most by "// &
+      & to_text(0.5_dp*figures%deep%deepest, 2)//" of it: bodies may come out on the other side", error)
     if (simulation%tally%stiffest > 2.0_dp*self%told_stiffest) then
       self%told_stiffest = simulation%tally%stiffest
       call warn(self, warn_springs, 1_i8, "warning     "//spring_warning(simulation), error)

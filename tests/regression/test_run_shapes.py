@@ -323,7 +323,7 @@ class Shapes(RunTestCase):
         spring = {"scene": {"friction": 0.0, "gravity": [0, 0]}, "material": [{"name": "m"}],
                   "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e5}]}
         fast = "in step 1 the way of 1 grain, of an end that turns, or of a boundary towards it, is longer than half of the thickness"
-        deep = "overlap by a quarter of a thickness and more"
+        deep = "by a quarter of a thickness and more"
         for name, shape, bodies, more, steps, words in (
                 ("slab", "box 1 1 0.01", head + "-15,\n", merged(solid, {"scene": {"restitution": 0.5}}), (1e-3, 20), (fast, deep)),
                 ("plank", "box 0.12 0.024 0.008", head + "-4,\n", solid, (5e-3, 15), (fast, deep)),
@@ -339,6 +339,23 @@ class Shapes(RunTestCase):
                     self.assertEqual(word in run.stdout, word in words, word)
                 check = gravier("--check", "case.nml", directory=directory)
                 self.assertEqual(fast in check.stdout, fast in words)
+
+    def test_soft_balls(self):
+        """A disk that a soft spring lets through a segment, or through another disk, is warned of; a plane stops it, and no harder spring lets it in."""
+        soft = {"scene": {"gravity": [0.0, 0.0]}, "material": [{"name": "m"}],
+                "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e3}], "time": {"step": 1e-4, "steps": 400}}
+        ground = {"segment": {"shape": "segment", "point": [1.0, 0.0], "end": [-1.0, 0.0]}, "plane": {"shape": "plane", "normal": [0.0, 1.0]}}
+        words = "1 contact overlaps by a quarter of a thickness and more in step "
+        for name, more, told in (("segment", {}, True), ("plane", {}, False), ("pair", {}, True), ("hard", {"law": [{**soft["law"][0], "normal_stiffness": 1e7}]}, False)):
+            bodies = "id,x,y,radius,vy\n1,0,0.051,0.05,-3\n" + ("2,0,-0.05,0.05,0\n" if name in ("pair", "hard") else "")
+            case = merged(merged(CASE, soft), {**more, "boundary": [{"material": "m", **ground[name]}] if name in ground else []})
+            case["scene"].pop("shapes", None)
+            directory = self.here(f"soft {name}")
+            os.makedirs(directory)
+            write(os.path.join(directory, case["scene"]["bodies_file"]), bodies)
+            run = run_case(case, 1, directory)
+            self.assert_status(run, 0)
+            self.assertEqual(words in run.stdout, told, name)
 
     def test_pressure_across_a_period(self):
         """Three bricks stacked across the side of a period have the pressures and the chains that they have in its middle. Each contact has

@@ -1,5 +1,5 @@
 !> Grains that enter the scene. Every rank knows which grains are owed and where they may be placed; subdomains near a region find
-!> out which of these places bodies take, and one reduction of a word a grain tells all ranks. All then choose alike, and the
+!> out which of these places bodies take, and reductions of a word a grain tell all ranks. All then choose alike, and the
 !> subdomain that holds the place of a grain owns it.
 module gravier_inflow
   use gravier_kinds, only: dp, i8
@@ -17,6 +17,9 @@ module gravier_inflow
   integer, parameter :: given_words = 2
   !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: given_record = "given_entered given_mass"
+
+  !> grains of an insertion whose candidate places are looked at together, at first
+  integer, parameter :: looked_at_once = 16
 
   !> Grains with their centres (nd, n) [m] and materials (n).
   type :: placed_t
@@ -47,10 +50,13 @@ module gravier_inflow
     procedure :: set_state => inflow_set_state
   end type inflow_t
 
-  !> The grains that an insertion owes in a step, with a word each: bits of candidate places that are taken.
+  !> The grains that an insertion owes in a step, with a word each: bits of candidate places that are taken, up to `looked_at`.
   type :: owed_t
     type(new_grain_t), allocatable :: grain(:)
     integer(i8), allocatable :: taken(:)
+    integer :: looked_at = 0
+    !> the bodies of this rank that reach into the region
+    type(placed_grains_t) :: near
     !> it owes more than may enter in a step
     logical :: more = .false.
   end type owed_t
@@ -174,20 +180,26 @@ contains
       n = n + size(owed(i)%grain)
     end do
     if (n == 0) return
-    allocate (words(n), placed%grain(n), placed%position(decomposition%nd, n), placed%material(n))
+    allocate (placed%grain(n), placed%position(decomposition%nd, n), placed%material(n))
+    allocate (words(looked_at_once*size(owed)), source=0_i8)
     first = 1
     do i = 1, size(owed)
-      allocate (owed(i)%taken(size(owed(i)%grain)))
-      call find_taken(self%insertions(i), decomposition, owed(i))
-      words(first:first + size(owed(i)%grain) - 1) = owed(i)%taken
-      first = first + size(owed(i)%grain)
+      associate (own => owed(i))
+        allocate (own%taken(size(own%grain)), source=0_i8)
+        if (size(own%grain) > 0) call collect_near(self%insertions(i), decomposition, maxval(own%grain%radius), own%near)
+        n = min(looked_at_once, size(own%grain))
+        call find_taken(self%insertions(i), own, n)
+        words(first:first + n - 1) = own%taken(1:n)
+        first = first + n
+      end associate
     end do
-    call decomposition%comm%union_of(words)
+    call decomposition%comm%union_of(words(1:first - 1))
     first = 1
     do i = 1, size(owed)
-      owed(i)%taken(:) = words(first:first + size(owed(i)%grain) - 1)
-      first = first + size(owed(i)%grain)
-      call choose_places(self%insertions(i), owed(i), decomposition, placed)
+      n = owed(i)%looked_at
+      owed(i)%taken(1:n) = words(first:first + n - 1)
+      first = first + n
+      call let_in(self%insertions(i), owed(i), decomposition, placed)
     end do
     if (placed%n > 0) call create_bodies(decomposition, placed, self%next_id)
     self%next_id = self%next_id + placed%n
@@ -205,23 +217,44 @@ contains
     self%given%n = 0
   end subroutine enter_given
 
-  !> Candidate places that bodies of this rank take.
-  subroutine find_taken(insertion, decomposition, owed)
-    type(insertion_t), intent(in) :: insertion
-    type(decomposition_t), intent(in) :: decomposition
+  !> Place the grains that an insertion owes, whose first ones have been looked at on all ranks. As most insertions that fill their
+  !> region find places for few, the others are looked at as it comes to them, twice as many each time. Collective.
+  subroutine let_in(insertion, owed, decomposition, placed)
+    type(insertion_t), intent(inout) :: insertion
     type(owed_t), intent(inout) :: owed
-    type(placed_grains_t) :: near
-    real(dp) :: position(insertion%nd)
-    integer :: k, c
+    type(decomposition_t), intent(in) :: decomposition
+    type(placed_t), intent(inout) :: placed
+    integer :: first
+    logical :: found
 
-    owed%taken(:) = 0
-    if (size(owed%grain) == 0) return
-    call collect_near(insertion, decomposition, maxval(owed%grain%radius), near)
-    if (near%n == 0) return
-    do k = 1, size(owed%grain)
+    first = 1
+    do
+      call choose_places(insertion, owed, first, decomposition, placed, found)
+      if (.not. found .or. owed%looked_at == size(owed%grain)) exit
+      first = owed%looked_at + 1
+      call find_taken(insertion, owed, min(2*owed%looked_at, size(owed%grain)))
+      call decomposition%comm%union_of(owed%taken(first:owed%looked_at))
+    end do
+    if (.not. found) insertion%put_off = insertion%put_off + 1
+    if (found .and. owed%more) insertion%held_back = insertion%held_back + 1
+    insertion%drawn = insertion%drawn + int(size(owed%grain), i8)*candidates_a_grain
+  end subroutine let_in
+
+  !> Candidate places that bodies of this rank take, of the grains up to one.
+  subroutine find_taken(insertion, owed, last)
+    type(insertion_t), intent(in) :: insertion
+    type(owed_t), intent(inout) :: owed
+    integer, intent(in) :: last
+    real(dp) :: position(insertion%nd)
+    integer :: first, k, c
+
+    first = owed%looked_at + 1
+    owed%looked_at = last
+    if (owed%near%n == 0) return
+    do k = first, last
       do c = 1, candidates_a_grain
         call insertion%place(candidate_of(insertion, k, c), owed%grain(k)%radius, position)
-        if (near%blocks(0_i8, owed%grain(k)%radius, position)) owed%taken(k) = ibset(owed%taken(k), c - 1)
+        if (owed%near%blocks(0_i8, owed%grain(k)%radius, position)) owed%taken(k) = ibset(owed%taken(k), c - 1)
       end do
     end do
   end subroutine find_taken
@@ -275,18 +308,20 @@ contains
     end do
   end subroutine collect_near
 
-  !> Place the grains that an insertion owes one after the other, up to the first one that finds no place.
-  subroutine choose_places(insertion, owed, decomposition, placed)
+  !> Place grains that have been looked at one after the other, from one on and up to the first that finds no place.
+  subroutine choose_places(insertion, owed, first, decomposition, placed, found)
     type(insertion_t), intent(inout) :: insertion
     type(owed_t), intent(in) :: owed
+    integer, intent(in) :: first
     type(decomposition_t), intent(in) :: decomposition
     type(placed_t), intent(inout) :: placed
+    !> whether all of them have found places
+    logical, intent(out) :: found
     real(dp) :: position(decomposition%nd)
-    logical :: found
     integer :: k, c
 
     found = .true.
-    do k = 1, size(owed%grain)
+    do k = first, owed%looked_at
       associate (grain => owed%grain(k))
         found = .false.
         do c = 1, candidates_a_grain
@@ -295,10 +330,7 @@ contains
           found = is_apart(placed, grain%radius, position) .and. is_clear(decomposition%boundaries, grain%radius, position)
           if (found) exit
         end do
-        if (.not. found) then
-          insertion%put_off = insertion%put_off + 1
-          exit
-        end if
+        if (.not. found) return
         placed%n = placed%n + 1
         placed%grain(placed%n) = grain
         placed%position(:, placed%n) = position
@@ -307,8 +339,6 @@ contains
         insertion%mass = insertion%mass + grain%mass
       end associate
     end do
-    if (found .and. owed%more) insertion%held_back = insertion%held_back + 1
-    insertion%drawn = insertion%drawn + int(size(owed%grain), i8)*candidates_a_grain
   end subroutine choose_places
 
   !> Whether a place overlaps none of those that have been chosen.

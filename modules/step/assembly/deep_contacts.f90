@@ -1,4 +1,4 @@
-!> Contacts that are pressed so deep that thin bodies may come out on the other side of each other.
+!> Contacts that are pressed so deep that bodies may come out on the other side of each other.
 module gravier_deep_contacts
   use gravier_kinds, only: dp, i8
   use gravier_contact_problem, only: contact_problem_t
@@ -11,6 +11,8 @@ module gravier_deep_contacts
   !> A contact is deep from this overlap on, over the half thickness of the thinner body. Two equal slabs that overlap by twice
   !> their half thickness have their centres in one plane: nothing tells any more on which side they were.
   real(dp), parameter :: deep = 0.5_dp
+  !> deformation of compliant contacts, over the mean radius, from which on balls are looked at
+  real(dp), parameter :: soft = 0.05_dp
 
   type :: deep_contacts_t
     !> how many there are
@@ -24,16 +26,20 @@ module gravier_deep_contacts
 contains
 
   !> Count the contacts whose overlap is half of the half thickness of the thinner body or more, and find the largest overlap over
-  !> that half thickness. Planes, which stop whatever is behind them, have no such contacts. Collective.
-  subroutine deep_contacts_find(self, decomposition, halo, problem)
+  !> that half thickness. Planes, which stop whatever is behind them, have no such contacts. Disks and spheres are looked at where
+  !> they are soft: overlaps of rigid ones are projected. Collective.
+  subroutine deep_contacts_find(self, decomposition, halo, problem, deformation)
     class(deep_contacts_t), intent(out) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(in) :: problem
+    !> of compliant contacts so far, at most, the same on all ranks [m]
+    real(dp), intent(in) :: deformation
     integer(i8) :: counts(1)
     real(dp) :: share
     integer :: s, c, i, j
 
+    if (decomposition%no == 0 .and. .not. deformation > soft*decomposition%rule%mean_radius) return
     counts(:) = 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), view => halo%view(s))

@@ -1082,7 +1082,9 @@ contains
     call make(sim, "gravity = 0, 0 /"//newline//"&boundary shape = 'plane', point = 0, -1.01, normal = 0, 1 /"//newline// &
       & "&time step = 0.01, steps = 9 /"//newline//exact//" /")
     call sim%assemble(figures)
-    call deep%find(sim%decomposition, sim%halo, sim%problem)
+    call deep%find(sim%decomposition, sim%halo, sim%problem, 0.0_dp)
+    call check_equal(int(deep%number), 0, "rigid disks are not looked at")
+    call deep%find(sim%decomposition, sim%halo, sim%problem, 0.5_dp)
     call check_equal(int(deep%number), 1, "contacts that are deep")
     call check_close(deep%deepest, 0.6_dp, solved, "the deepest of them")
     call sim%free()
