@@ -272,8 +272,7 @@ def draw_column(axes, run, tables, column, axis, mean):
             colour = LINES[c % len(LINES)] if len(rows) == 1 else TIMES(k / (len(rows) - 1))
             x, y = (values, centre) if upright else (centre, values)
             axes.plot(x, y, STYLES[c % len(STYLES)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
-    shown = numpy.concatenate([[0.0], *(values for row in rows for values in row.values())])
-    shown = shown[numpy.isfinite(shown)][1:] if numpy.isfinite(shown).sum() > 1 else shown[:1]
+    shown = numpy.concatenate([values for row in rows for values in row.values()])
     unit = "N/m" if run.dimension == 2 else "Pa"
     label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)
     fit_axis(axes.xaxis if upright else axes.yaxis, shown, label, logarithms=False)

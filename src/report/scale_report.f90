@@ -79,7 +79,6 @@ contains
     real(dp) :: error
     real(dp) :: g, a, most, half
     character(len=:), allocatable :: halves, least
-    integer :: b
 
     text = ""
     number = 0
@@ -104,13 +103,7 @@ contains
         & least//" in it", most_by_boundary*scales%smallest/scales%speed)
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       call warn(cell_warning(simulation, d))
-      call warn(table_warning(simulation, simulation%gravity_table, "&scene gravity_table = '"// &
-        & trim(simulation%config%scene%gravity_table)//"'"))
-      do b = 1, size(simulation%decomposition%boundaries)
-        associate (boundary => simulation%decomposition%boundaries(b))
-          call warn(table_warning(simulation, boundary%table, "boundary '"//boundary%name//"': its table"))
-        end associate
-      end do
+      call warn(table_warning(simulation))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -174,19 +167,37 @@ contains
     end associate
   end function cell_warning
 
-  !> That steps pass over the ups and downs of a table; else empty.
-  function table_warning(simulation, table, name) result(text)
+  !> That steps pass over the ups and downs of a table, the one of which they keep the least part; else empty.
+  function table_warning(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
-    type(time_table_t), intent(in) :: table
-    character(len=*), intent(in) :: name
     character(len=:), allocatable :: text
-    real(dp) :: kept
+    real(dp) :: least
+    integer :: b
 
     text = ""
-    if (.not. allocated(table%has)) return
-    kept = table%kept_variation(simulation%config%time%step, simulation%config%time%steps)
-    if (kept < least_kept) text = name//" turns within steps: they keep "//to_text(nint(100.0_dp*kept))// &
-      & " % of its ups and downs; a smaller &time step keeps more"
+    least = least_kept
+    call look(simulation%gravity_table, "&scene gravity_table = '"//trim(simulation%config%scene%gravity_table)//"'")
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(b))
+        call look(boundary%table, "boundary '"//boundary%name//"': its table")
+      end associate
+    end do
+
+  contains
+
+    subroutine look(table, name)
+      type(time_table_t), intent(in) :: table
+      character(len=*), intent(in) :: name
+      real(dp) :: kept
+
+      if (.not. allocated(table%has)) return
+      kept = table%kept_variation(simulation%config%time%step, simulation%config%time%steps)
+      if (.not. kept < least) return
+      least = kept
+      text = name//" turns within steps: they keep "//to_text(nint(100.0_dp*kept))// &
+        & " % of its ups and downs; a smaller &time step keeps more"
+    end subroutine look
+
   end function table_warning
 
   !> That the way of grains in a step is too long.

@@ -93,7 +93,7 @@ contains
         return
       end if
       call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
-        & ": expected "//trim(adjustl(line_before)))
+        & ": expected "//trim(adjustl(line_before))//", or a new run that begins with the final_bodies.h5 of this one")
       return
     end do
   end subroutine compare_options

@@ -188,7 +188,8 @@ contains
   end function time_table_changes_after
 
   !> What steps keep of the ups and downs of the quantities until some step, for the quantity that loses most: the sum of the
-  !> changes from step to step over that of the changes from row to row. 1 where nothing turns within a step. The table has been read.
+  !> changes from step to step over that of the changes from row to row. 1 where nothing turns within a step. The table has been
+  !> read.
   pure real(dp) function time_table_kept_variation(self, step, steps) result(share)
     class(time_table_t), intent(in) :: self
     !> [s]
