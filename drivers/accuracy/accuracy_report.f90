@@ -69,7 +69,9 @@ contains
     call table%close(error)
     do v = 1, size(cases, 2)
       call sum_up(study, study%variants(v)%name, cases(:, v), summary)
+      call note_failed(summary, study%variants(v)%name, sum(cases(:, v)%run%failed))
     end do
+    if (study%reference == "tight") call note_failed(summary, study%tight%name, reference%run%failed)
   end subroutine write_runs
 
   subroutine write_row(table, study, name, value, of, ranks, error)
@@ -246,6 +248,15 @@ contains
       if (tolerances(k) > tolerances(place)) place = k
     end do
   end function place_of_knee
+
+  !> How many solves missed their tolerance, where some have: orders and knees are not those of such runs.
+  subroutine note_failed(summary, name, failed)
+    type(summary_t), intent(inout) :: summary
+    character(len=*), intent(in) :: name
+    integer, intent(in) :: failed
+
+    if (failed > 0) call summary%note(name, "failed_solves", real(failed, dp))
+  end subroutine note_failed
 
   subroutine note_knee(summary, name, quantity, k, x, cases)
     type(summary_t), intent(inout) :: summary

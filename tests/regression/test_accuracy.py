@@ -160,6 +160,17 @@ class Columns(Studies):
         self.assertEqual(len(rows), 6)
         self.assertIn("*** 1 of the solves did NOT reach their tolerance", run.stdout)
 
+    def test_summary_of_missed_solves(self):
+        """The summary says of which variant, and of a reference, solves missed their tolerance."""
+        case = merged(DISKS, {"time": {"steps": 60}, "solver": {"max_iterations": 2}})
+        _, rows, summary = self.study("missed runs", case, {"kind": "run", "vary": "tolerance", "values": "1e9, 1e-6", "samples": 1, "quantities": ["pressure"]},
+                                      "&reference tolerance = 1.0e-6 /", "&variant name = 'NLGS' /", status=3)
+        missed = {(row["variant"], row["value"]): int(row["failed"]) for row in rows}
+        found = {row["variant"]: int(float(row["value"])) for row in summary if row["figure"] == "failed_solves"}
+        self.assertEqual(missed["NLGS", "1e9"], 0)
+        self.assertGreater(missed["NLGS", "1e-6"], 0)
+        self.assertEqual(found, {"NLGS": missed["NLGS", "1e-6"], "reference": missed["reference", ""]})
+
 
 class Packing(Studies):
     ASKED = {"kind": "run", "vary": "tolerance", "values": "1e-1, 1e-2, 1e-3", "samples": 4, "knee": 0.02,
