@@ -181,10 +181,11 @@ contains
     if (self%watched > 0) call self%decomposition%boundaries(self%watched)%find_place(self%watched_from)
   end subroutine watch_boundary
 
-  !> Partitions cover the regions that grains enter in; where there are no grains at the start, the mean grain is that of the first
-  !> insertion.
+  !> Partitions cover the regions that grains enter in; where there are no grains at the start, the mean grain is that of those that
+  !> are to enter.
   subroutine prepare_inflow(self)
     class(simulation_t), intent(inout) :: self
+    real(dp) :: share(size(self%inflow%insertions))
     integer :: d, nd
 
     nd = self%decomposition%nd
@@ -195,8 +196,16 @@ contains
         self%decomposition%entry_box(d, 2) = maxval(insertions%upper(d))
       end do
       if (self%velocity_scale%mass > 0.0_dp) return
-      self%velocity_scale%diameter = 2.0_dp*insertions(1)%radii%moment(1)
-      self%velocity_scale%mass = insertions(1)%mean_mass()
+      ! the mean of all that are to enter, or of one grain of each insertion where their numbers have no bound
+      do d = 1, size(insertions)
+        share(d) = insertions(d)%planned(self%config%time%steps*self%physics%h)
+      end do
+      if (.not. (maxval(share) > 0.0_dp .and. maxval(share) < huge(1.0_dp))) share(:) = 1.0_dp
+      share(:) = share/sum(share)
+      do d = 1, size(insertions)
+        self%velocity_scale%diameter = self%velocity_scale%diameter + share(d)*2.0_dp*insertions(d)%radii%moment(1)
+        self%velocity_scale%mass = self%velocity_scale%mass + share(d)*insertions(d)%mean_mass()
+      end do
     end associate
   end subroutine prepare_inflow
 

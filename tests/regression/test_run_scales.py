@@ -102,6 +102,18 @@ class Scales(RunTestCase):
         for text, value in zip(found.groups(), (10.0 * 1e-3 / 1e6, 0.1 * G * 1e-3, most)):
             self.assertAlmostEqual(float(text) / value, 1.0, delta=6e-3)
 
+    def test_mean_of_what_enters(self):
+        """Of a scene that is filled, the mean grain is that of all that are to enter; of insertions without a number each counts alike."""
+        case = {"scene": {"dimension": 2, "bodies": "none"}, "time": {"step": 1e-3, "steps": 100},
+                "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}],
+                "insertion": [{"name": name, "lower": [0.0, 0.5], "upper": [0.4, 0.6], "radius": radius, "count": count}
+                              for name, radius, count in (("big", 0.007, 120), ("small", 0.0035, 480))]}
+        for title, more, diameter in (("counts", {}, "8.40E-03"), ("rates", {"count": None, "rate": 1e3}, "1.05E-02"), ("free", {"count": None}, "1.05E-02")):
+            insertions = [{key: value for key, value in {**one, **more}.items() if value is not None} for one in case["insertion"]]
+            run = run_case({**case, "insertion": insertions}, directory=self.here(f"enters {title}"), options=("--check",))
+            self.assert_status(run, 0)
+            self.assertIn(f"mean diameter d = {diameter} m", run.stdout)
+
     def test_table_that_turns_within_steps(self):
         """A table of a drive or of gravity whose ups and downs fall between steps is warned of; with steps that follow it it is not."""
         wave = "".join(f"{0.005 * k},{(k % 2) * 9.81}\n" for k in range(41))

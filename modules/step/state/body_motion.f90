@@ -49,10 +49,8 @@ contains
     call decomposition%period%move(part)
     do b = 1, size(decomposition%boundaries)
       associate (boundary => decomposition%boundaries(b))
-        ! one that was taken away stays where it was then
-        if (.not. boundary%present) cycle
         call boundary%move(part)
-        if (time + rounded*physics%h < boundary%remove_at) cycle
+        if (.not. boundary%present .or. time + rounded*physics%h < boundary%remove_at) cycle
         boundary%present = .false.
         taken_away = .true.
       end associate
@@ -132,7 +130,7 @@ contains
     if (some_glued) call carry_glued(decomposition, theta*physics%h)
     call decomposition%period%move(theta*physics%h)
     do b = 1, size(decomposition%boundaries)
-      if (decomposition%boundaries(b)%present) call decomposition%boundaries(b)%move(theta*physics%h)
+      call decomposition%boundaries(b)%move(theta*physics%h)
     end do
     if (some_glued) call set_glued_velocities(decomposition)
   end subroutine move_to_end
