@@ -293,6 +293,10 @@ contains
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
         text = "ten times the "//goal_name(simulation)//": "//duration_text(rest + looser_seconds(2))//" to "// &
           & duration_text(rest + looser_seconds(3))//" in all (estimated)"
+      else if (phases(phase_factorise) + phases(phase_interface_solve) > half .and. simulation%fallback%taken > 0 .and. &
+        & .not. simulation%physics%laws%yields) then
+        text = "Newton's method, which takes over solves that stagnate, takes most of it: contacts that yield "// &
+          & "(&law kind = 'elastic') may stagnate less"
       else if (shared > half .and. simulation%decomposition%n_subdomains > 1) then
         text = "the interface takes most of it: fewer &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", on fewer ranks"

@@ -1,0 +1,66 @@
+!> What would halve the time of a run, from phases that are made up: the advice names what takes most, and nothing that is in vain.
+program test_run_summary
+  use gravier_kinds, only: dp
+  use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_timers, only: n_phases, phase_factorise, phase_interface_solve, phase_neighbourhood, phase_output
+  use gravier_run_summary, only: halving_text
+  use gravier_simulation, only: simulation_t
+  use gravier_test_simulations, only: make_scene
+  use gravier_check, only: check, finish_checks
+  implicit none
+
+  character(len=*), parameter :: column = "&scene bodies = 'column', column_count = 3, radius = 0.5, gravity = 0, -10 / "
+  !> of a run [s]; costs of looser solves are not known
+  real(dp), parameter :: seconds = 10.0_dp, unknown(3) = -1.0_dp
+  type(communicator_t), target :: comm
+
+  call start_parallel()
+  call comm%init()
+  call test_output()
+  call test_newton()
+  call finish_checks()
+  call comm%free()
+  call stop_parallel()
+
+contains
+
+  subroutine test_output()
+    type(simulation_t) :: simulation
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 / &output every = 10 /", simulation)
+    call check(says(simulation, [phase_output], "a larger &output every, now 10"), "output that takes most of the time")
+    call check(.not. says(simulation, [phase_neighbourhood], "&output"), "output that takes none of it")
+    call check(says(simulation, [phase_neighbourhood], "a larger &scene skin"), "neighbour lists that take most of the time")
+    call simulation%free()
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 / &output every = 100 /", simulation)
+    call check(.not. says(simulation, [phase_output], "&output every"), "no state is written but the first and the last")
+    call simulation%free()
+  end subroutine test_output
+
+  subroutine test_newton()
+    type(simulation_t) :: simulation
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 /", simulation)
+    call check(.not. says(simulation, [phase_factorise, phase_interface_solve], "Newton's method"), "it has taken nothing over")
+    simulation%fallback%taken = 1
+    call check(says(simulation, [phase_factorise, phase_interface_solve], "Newton's method, which takes over solves that "// &
+      & "stagnate"), "solves that it has taken over take most of the time")
+    call check(.not. says(simulation, [phase_neighbourhood], "Newton's method"), "they take little of it")
+    simulation%physics%laws%yields = .true.
+    call check(.not. says(simulation, [phase_factorise, phase_interface_solve], "kind = 'elastic'"), "contacts that yield already")
+    call simulation%free()
+  end subroutine test_newton
+
+  !> Whether the advice has some words where these phases together take nine tenths of the time.
+  logical function says(simulation, dear, words)
+    type(simulation_t), intent(in) :: simulation
+    integer, intent(in) :: dear(:)
+    character(len=*), intent(in) :: words
+    real(dp) :: phases(n_phases)
+
+    phases(:) = 0.0_dp
+    phases(dear) = 0.9_dp*seconds/size(dear)
+    says = index(halving_text(simulation, phases, seconds, unknown), words) > 0
+  end function says
+
+end program test_run_summary
