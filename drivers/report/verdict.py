@@ -89,9 +89,9 @@ def mended(log, history):
         return Answer(question, GOOD, f"No: overlaps are not projected in this case. {overlap}")
     told = next((line for line in lines if line.startswith("projected in ")), "")
     found = re.match(r"projected in (\d+) of (\d+) steps", told)
-    if not found and "no step projected overlaps" in lines:
-        found = re.match(r"(\d+) of (\d+)", f"0 of {len(history) if log.restarts == 0 else last_part(log, history)}")
-    share, known = (int(found[1]) / max(1, int(found[2])), int(found[2])) if found else (0.0, 0)
+    # of so many steps the log knows the share; of none before its last words
+    known = int(found[2]) if found else last_part(log, history) if "no step projected overlaps" in lines else 0
+    share = int(found[1]) / max(1, known) if found else 0.0
     small = re.search(r", (\S+) of its path", told)
     grade = GOOD if share == 0.0 else BAD if share > OFTEN else DOUBT
     if small and float(small[1]) < LITTLE:
@@ -110,7 +110,7 @@ def mended(log, history):
 
 
 def last_part(log, history):
-    """Steps since the last restart, which the log names by the step of its checkpoint."""
+    """Steps since the last restart, which the log names by the step of its checkpoint; all of them without one."""
     found = re.match(r"from the checkpoint of step (\d+)", log.value("restart"))
     return int((history.step > int(found[1])).sum()) if found else len(history)
 
@@ -119,8 +119,9 @@ def too_fast(history):
     """Whether something went too far in a step to be seen by what it passed."""
     if "fast" not in history or not (history.fast > 0).any():
         return []
-    return [Answer("Was the step short enough?", DOUBT, f"Not always: {int(history.fast.sum())} times something moved by more than half of its thickness in a step, "
-                   f"in {int((history.fast > 0).sum())} steps. It may have passed through others.")]
+    times, steps = int(history.fast.sum()), int((history.fast > 0).sum())
+    return [Answer("Was the step short enough?", DOUBT, f"Not always: {times} times something moved by more than half of its thickness in a step, in {steps} steps. "
+                   "It may have passed through others.")]
 
 
 def balanced(log):

@@ -344,7 +344,7 @@ contains
     first = 1
     do while (first <= len(names))
       last = first + index(names(first:)//",", ",") - 2
-      if (index(","//self%files//",", ","//names(first:last)//",") == 0) self%files = self%files//","//names(first:last)
+      if (.not. is_among(names(first:last), self%files)) self%files = self%files//","//names(first:last)
       first = last + 2
     end do
     if (index(self%files, ",") == 1) self%files = self%files(2:)
@@ -355,7 +355,14 @@ contains
     class(simulation_t), intent(in) :: self
     character(len=*), intent(in) :: name
 
-    goes_on = self%restarted .and. index(","//self%files//",", ","//name//",") > 0
+    goes_on = self%restarted .and. is_among(name, self%files)
   end function simulation_goes_on_with
+
+  !> Whether a name is one of some with commas between.
+  pure logical function is_among(name, names)
+    character(len=*), intent(in) :: name, names
+
+    is_among = index(","//names//",", ","//name//",") > 0
+  end function is_among
 
 end module gravier_simulation

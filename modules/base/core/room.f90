@@ -89,7 +89,7 @@ contains
   !> Bytes that processes of a control group can still get; huge without a limit.
   integer(i8) function group_memory(directory, version) result(bytes)
     character(len=*), intent(in) :: directory
-    !> of control groups, 1 for the second one and 2 for the first one
+    !> of control groups, as the names above have them: the present one first, then the older one
     integer, intent(in) :: version
     integer(i8) :: limit
     integer :: k
