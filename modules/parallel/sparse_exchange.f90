@@ -8,7 +8,7 @@ module gravier_sparse_exchange
   use gravier_sorting, only: argsort
   implicit none
   private
-  public :: sparse_exchange
+  public :: sparse_exchange, exchange_sorted
 
   type :: message_t
     integer :: source = 0
@@ -31,13 +31,11 @@ contains
     !> (words of a record, number received), by source rank, then in the order of sending
     integer(i8), allocatable, intent(out) :: received(:, :)
 
-    integer, allocatable :: order(:), target_rank(:), first(:), last(:)
+    integer, allocatable :: order(:), target_rank(:)
     integer(i8), allocatable :: keys(:)
     integer(i8), allocatable, asynchronous :: outgoing(:, :)
-    type(message_t), allocatable :: messages(:)
-    integer :: i, n_messages
+    integer :: i
 
-    comm%exchanges = mod(comm%exchanges + 1, 2)
     allocate (order(size(destination)), target_rank(size(destination)))
     allocate (outgoing(size(records, 1), size(records, 2)))
     keys = int(destination, i8)
@@ -46,12 +44,32 @@ contains
       outgoing(:, i) = records(:, order(i))
       target_rank(i) = destination(order(i))
     end do
+    deallocate (keys, order)
+    call exchange_sorted(comm, outgoing, target_rank, received)
+  end subroutine sparse_exchange
+
+  !> The same for records that stand in the order of the ranks they are sent to. Collective.
+  subroutine exchange_sorted(comm, outgoing, target_rank, received)
+    type(communicator_t), intent(in) :: comm
+    !> (words of a record, number of records); deallocated at the end
+    integer(i8), allocatable, intent(inout), asynchronous :: outgoing(:, :)
+    !> (number of records): ranks from 0, ascending
+    integer, intent(in), contiguous :: target_rank(:)
+    !> (words of a record, number received), by source rank, then in the order of sending
+    integer(i8), allocatable, intent(out) :: received(:, :)
+
+    integer, allocatable :: first(:), last(:)
+    type(message_t), allocatable :: messages(:)
+    integer :: n_messages, n_words
+
+    comm%exchanges = mod(comm%exchanges + 1, 2)
+    n_words = size(outgoing, 1)
     call find_runs(target_rank, first, last)
     call deliver(comm, outgoing, target_rank, first, last, messages, n_messages)
     ! everything is delivered: the memory of what was sent is free for what has come
     deallocate (outgoing)
-    call merge_messages(size(records, 1), messages(1:n_messages), received)
-  end subroutine sparse_exchange
+    call merge_messages(n_words, messages(1:n_messages), received)
+  end subroutine exchange_sorted
 
   !> First and last place of each run of equal values in ascending `values`.
   pure subroutine find_runs(values, first, last)

@@ -34,7 +34,7 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     type(fclib_rows_t) :: rows
-    type(field_list_t) :: bodies, contacts, sorted
+    type(field_list_t) :: bodies, contacts
     type(places_t) :: places(size(simulation%problem%sub))
     character(len=1), parameter :: no_fields(0) = ""
 
@@ -43,13 +43,13 @@ contains
     ! a projection of overlaps has used the velocities for its own
     call simulation%problem%evaluate()
     call collect_problem_bodies(simulation%problem, bodies)
-    call bodies%order(simulation%comm, sorted)
-    call take_bodies(sorted, rows)
-    call number_bodies(simulation%problem, sorted, places)
+    call bodies%order(simulation%comm)
+    call take_bodies(bodies, rows)
+    call number_bodies(simulation%problem, bodies, places)
     call collect_contacts(simulation, no_fields, contacts)
     call add_columns(simulation%problem, places, contacts)
-    call contacts%order(simulation%comm, sorted)
-    call take_contacts(sorted, rows%dimension, simulation%problem%kernels%nv, rows)
+    call contacts%order(simulation%comm)
+    call take_contacts(contacts, rows%dimension, simulation%problem%kernels%nv, rows)
     call write_fclib_global(simulation%comm, path, rows, error)
   end subroutine write_problem
 

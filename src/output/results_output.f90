@@ -6,7 +6,7 @@ module gravier_results_output
   use gravier_diagnostic, only: histogram_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, provenance_t, results_step_t, figures_t, accuracy_t
+  use gravier_results_file, only: results_file_t, provenance_t, figures_t, accuracy_t
   use gravier_build_info, only: version
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -121,23 +121,33 @@ contains
     type(step_figures_t), intent(in) :: figures
     real(dp), intent(in) :: seconds
     type(error_t), allocatable, intent(inout) :: error
-    type(results_step_t) :: state
-    logical :: has_contacts
+    type(accuracy_t), allocatable :: accuracy
+    type(figures_t), allocatable :: of_scene
+    type(field_list_t) :: table
+    type(field_list_t), allocatable :: region(:)
 
     associate (unused => figures, unused_seconds => seconds)
     end associate
-    state%step = simulation%step
-    state%time = simulation%time
-    has_contacts = simulation%config%output%contacts .and. allocated(simulation%problem%sub)
-    allocate (state%table(merge(3, 2, has_contacts) + merge(1, 0, simulation%effects%moving_cell)))
-    call collect_bodies(simulation, state%table(1))
-    if (has_contacts) call collect_contacts(simulation, contact_fields, state%table(2))
-    call collect_boundaries(simulation, state%table(merge(3, 2, has_contacts)))
-    if (simulation%effects%moving_cell) call collect_cell(simulation, state%table(size(state%table)))
-    if (simulation%tally%steps > 0) state%accuracy = accuracy_t(simulation%tally%velocity_error, simulation%tally%velocity_scale)
-    call collect_figures(simulation%diagnostics, state%figures)
-    call collect_regions(simulation, state%region)
-    call self%file%write_step(state, error)
+    if (simulation%tally%steps > 0) accuracy = accuracy_t(simulation%tally%velocity_error, simulation%tally%velocity_scale)
+    call self%file%begin_step(simulation%step, simulation%time, error, accuracy)
+    ! one table after the other is collected, written and let go
+    call collect_bodies(simulation, table)
+    call self%file%write_step_table(table, error)
+    if (simulation%config%output%contacts .and. allocated(simulation%problem%sub)) then
+      call collect_contacts(simulation, contact_fields, table)
+      call self%file%write_step_table(table, error)
+    end if
+    call collect_boundaries(simulation, table)
+    call self%file%write_step_table(table, error)
+    if (simulation%effects%moving_cell) then
+      call collect_cell(simulation, table)
+      call self%file%write_step_table(table, error)
+    end if
+    call collect_figures(simulation%diagnostics, of_scene)
+    if (allocated(of_scene)) call self%file%write_step_figures(of_scene, error)
+    call collect_regions(simulation, region)
+    if (allocated(region)) call self%file%write_step_regions(region, error)
+    call self%file%end_step(error)
     ! a run that goes on from a checkpoint does not write it again
     simulation%last_written = simulation%step
   end subroutine results_output_write

@@ -3,7 +3,7 @@ module gravier_test_results_rows
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, provenance_t, results_step_t, accuracy_t
+  use gravier_results_file, only: results_file_t, provenance_t, accuracy_t
   implicit none
   private
   public :: body_rows_t, contact_rows_t, boundary_rows_t, run_of, write_rows, write_boundaries
@@ -57,20 +57,20 @@ contains
     type(contact_rows_t), intent(in), optional :: contacts
     type(boundary_rows_t), intent(in), optional :: boundaries
     type(accuracy_t), intent(in), optional :: accuracy
-    type(results_step_t) :: state
-    integer :: n
+    type(field_list_t) :: table
 
-    state%step = step
-    state%time = time
-    if (present(accuracy)) state%accuracy = accuracy
-    n = 1
-    if (present(contacts)) n = n + 1
-    if (present(boundaries)) n = n + 1
-    allocate (state%table(n))
-    call make_bodies(bodies, state%table(1))
-    if (present(contacts)) call make_contacts(contacts, state%table(2))
-    if (present(boundaries)) call make_boundaries(boundaries, state%table(n))
-    call results%write_step(state, error)
+    call results%begin_step(step, time, error, accuracy)
+    call make_bodies(bodies, table)
+    call results%write_step_table(table, error)
+    if (present(contacts)) then
+      call make_contacts(contacts, table)
+      call results%write_step_table(table, error)
+    end if
+    if (present(boundaries)) then
+      call make_boundaries(boundaries, table)
+      call results%write_step_table(table, error)
+    end if
+    call results%end_step(error)
   end subroutine write_rows
 
   subroutine make_bodies(bodies, table)

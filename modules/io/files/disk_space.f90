@@ -8,7 +8,7 @@ module gravier_disk_space
     & o_wronly, falloc_fl_keep_size, seek_end, eintr, enospc, enosys, eopnotsupp, statvfs_words
   implicit none
   private
-  public :: reserve_space, extend_file
+  public :: reserve_space, give_back_space, extend_file
 
 contains
 
@@ -48,6 +48,17 @@ contains
     end if
     ignored = c_close(descriptor)
   end subroutine reserve_space
+
+  !> Give back the space that was reserved behind the end of a file.
+  subroutine give_back_space(path)
+    character(len=*), intent(in) :: path
+    integer(c_int) :: descriptor, ignored
+
+    descriptor = c_open(c_text(path), o_wronly, 0_c_int)
+    if (descriptor < 0) return
+    ignored = c_ftruncate(descriptor, c_lseek(descriptor, 0_c_int64_t, seek_end))
+    ignored = c_close(descriptor)
+  end subroutine give_back_space
 
   !> Give a file at least `length` bytes, zeros behind its end. Failure: status_failure, with the system's reason.
   subroutine extend_file(path, length, error)

@@ -3,7 +3,7 @@
 module gravier_field_list
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
-  use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
+  use gravier_ordered_rows, only: row_order_t
   implicit none
   private
   public :: field_t, field_list_t
@@ -186,50 +186,22 @@ contains
     end do
   end function field_list_words
 
-  !> The items of all ranks in the order of their keys, cut into nearly equal blocks; items with the same first key stay together. A
-  !> table with texts cannot be ordered. Collective.
-  subroutine field_list_order(self, comm, sorted)
-    class(field_list_t), intent(in) :: self
+  !> Put the items of all ranks in the order of their keys, cut into nearly equal blocks; items with the same first key stay
+  !> together. One field after the other is sent, so that the table is never in memory twice. A table with texts cannot be
+  !> ordered. Collective.
+  subroutine field_list_order(self, comm)
+    class(field_list_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
-    type(field_list_t), intent(out) :: sorted
-    integer(i8), allocatable :: records(:, :), ordered(:, :), whole(:, :)
-    real(dp), allocatable :: value(:, :)
-    integer :: k, at, n_keys
+    type(row_order_t) :: order
+    integer :: k
 
-    n_keys = size(self%key, 1)
-    allocate (records(self%words(), self%n_items()))
-    records(1:n_keys, :) = self%key
-    at = n_keys + 1
+    call order%find(comm, self%key)
     do k = 1, self%n_fields
-      associate (field => self%field(k))
-        if (allocated(field%value)) then
-          call pack_reals(field%components(), field%value, at, records)
-        else
-          records(at:at + field%components() - 1, :) = field%whole
-        end if
-        at = at + field%components()
-      end associate
-    end do
-    call order_rows(comm, n_keys, records, ordered)
-    if (n_keys == 1) then
-      call sorted%init(self%name, trim(self%key_name(1)), size(ordered, 2))
-    else
-      call sorted%init(self%name, trim(self%key_name(1))//" "//trim(self%key_name(2)), size(ordered, 2))
-    end if
-    sorted%key(:, :) = ordered(1:n_keys, :)
-    at = n_keys + 1
-    do k = 1, self%n_fields
-      associate (field => self%field(k), last => at + self%field(k)%components() - 1)
-        if (allocated(field%value)) then
-          call unpack_reals(ordered, at, field%components(), value)
-          call sorted%add_reals(field%name, field%unit, value, field%scalar)
-        else
-          allocate (whole(field%components(), size(ordered, 2)))
-          whole(:, :) = ordered(at:last, :)
-          call sorted%add_whole(field%name, field%unit, whole, field%scalar)
-        end if
-      end associate
-      at = at + self%field(k)%components()
+      if (allocated(self%field(k)%value)) then
+        call order%put_reals(self%field(k)%value)
+      else
+        call order%put_words(self%field(k)%whole)
+      end if
     end do
   end subroutine field_list_order
 

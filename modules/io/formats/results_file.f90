@@ -11,7 +11,7 @@ module gravier_results_file
   use gravier_hdf5_file, only: h5_file_t
   implicit none
   private
-  public :: results_file_t, provenance_t, results_step_t, figures_t, histogram_rows_t, accuracy_t
+  public :: results_file_t, provenance_t, figures_t, histogram_rows_t, accuracy_t
 
   !> What was run: enough to run it again.
   type :: provenance_t
@@ -49,21 +49,6 @@ module gravier_results_file
     real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
   end type accuracy_t
 
-  !> What is written of a step.
-  type :: results_step_t
-    integer :: step = 0
-    !> [s]
-    real(dp) :: time = 0.0_dp
-    !> the same ones on all ranks
-    type(field_list_t), allocatable :: table(:)
-    !> of a state that a solve has led to
-    type(accuracy_t), allocatable :: accuracy
-    !> where some were measured
-    type(figures_t), allocatable :: figures
-    !> tables that stand together in the group /steps/<step>/regions, the same on all ranks; not allocated where there are none
-    type(field_list_t), allocatable :: region(:)
-  end type results_step_t
-
   !> An open results file.
   type :: results_file_t
     !> after `reopen`: the file has the last step that was to stay
@@ -71,18 +56,25 @@ module gravier_results_file
     type(communicator_t), private :: comm
     type(h5_file_t), private :: file
     character(len=:), allocatable, private :: path
+    !> of the step that is being written
+    character(len=:), allocatable, private :: group
   contains
     procedure :: open => results_open
     procedure :: reopen => results_reopen
     procedure :: write_table => results_write_table
     procedure :: write_tables => results_write_tables
-    procedure :: write_step => results_write_step
+    !> a step: begin_step, then its tables, figures and regions in any order, then end_step
+    procedure :: begin_step => results_begin_step
+    procedure :: write_step_table => results_write_step_table
+    procedure :: write_step_figures => results_write_step_figures
+    procedure :: write_step_regions => results_write_step_regions
+    procedure :: end_step => results_end_step
     procedure :: close => results_close
   end type results_file_t
 
-  !> room for the headers of the groups and datasets of one step
+  !> room for the headers of the groups and datasets of one step but those of its tables
   integer(i8), parameter :: bytes_of_headers = 65536
-  !> the same for one table of a region
+  !> the same for one table
   integer(i8), parameter :: bytes_of_table = 32768
   integer, parameter :: bytes_of_word = 8
   !> steps for which /steps has room in one block: up to there a program that dies leaves the file whole
@@ -204,7 +196,7 @@ contains
     end do
   end subroutine find_later_steps
 
-  !> Write a table that holds for the whole run, once, as /NAME. It is the same on all ranks. Failure: as of write_step. Collective.
+  !> Write a table that holds for the whole run, once, as /NAME. It is the same on all ranks. Failure: as of a step. Collective.
   subroutine results_write_table(self, table, error)
     class(results_file_t), intent(inout) :: self
     type(field_list_t), intent(in) :: table
@@ -220,7 +212,7 @@ contains
   end subroutine results_write_table
 
   !> Write tables that hold for the whole run and belong together, once: the first as /NAME, the others in this group by their
-  !> names. They are the same on all ranks. Failure: as of write_step. Collective.
+  !> names. They are the same on all ranks. Failure: as of a step. Collective.
   subroutine results_write_tables(self, table, error)
     class(results_file_t), intent(inout) :: self
     type(field_list_t), intent(in) :: table(:)
@@ -247,80 +239,89 @@ contains
     call finish(self, error)
   end subroutine results_write_tables
 
-  !> Write /steps/<step>. Nothing of the step is in the file when this fails, and what was there stays readable.
-  !> Failure (status_failure): a number that is not finite, a disk that is full, a step written before. Collective.
-  subroutine results_write_step(self, state, error)
+  !> Begin /steps/<step>, which is in the file once end_step has ended. After a failure nothing of the step is there, and
+  !> what was there stays readable. Failure of these procedures (status_failure): a number that is not finite, a disk that is full,
+  !> a step written before. Collective.
+  subroutine results_begin_step(self, step, time, error, accuracy)
     class(results_file_t), intent(inout) :: self
-    type(results_step_t), intent(in) :: state
+    integer, intent(in) :: step
+    !> s
+    real(dp), intent(in) :: time
     type(error_t), allocatable, intent(inout) :: error
-    type(field_list_t), allocatable :: sorted(:)
+    !> of a state that a solve has led to
+    type(accuracy_t), intent(in), optional :: accuracy
+
+    if (allocated(error)) return
+    self%group = "/steps/"//to_text(step)
+    if (.not. is_finite(time)) call raise_not_finite(self, self%group//", attribute time", "", error)
+    if (present(accuracy)) then
+      if (.not. (is_finite(accuracy%velocity_error) .and. is_finite(accuracy%velocity_scale))) &
+        & call raise_not_finite(self, self%group//", attribute velocity_error or velocity_scale", "", error)
+    end if
+    call self%comm%agree(error)
+    call self%file%reserve(bytes_of_headers, error)
+    call self%file%begin_group(self%group, error)
+    call self%file%write_attribute(self%group, "step", step, error)
+    call self%file%write_attribute(self%group, "time", time, error)
+    if (.not. present(accuracy)) return
+    call self%file%write_attribute(self%group, "velocity_error", accuracy%velocity_error, error)
+    call self%file%write_attribute(self%group, "velocity_scale", accuracy%velocity_scale, error)
+  end subroutine results_begin_step
+
+  !> Write a table of the step. Collective.
+  subroutine results_write_step_table(self, table, error)
+    class(results_file_t), intent(inout) :: self
+    !> afterwards in the order of its keys, unless it is the same on all ranks
+    type(field_list_t), intent(inout) :: table
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: n_items
+
+    if (allocated(error)) return
+    n_items = table%n_items()
+    if (.not. table%everywhere) then
+      n_items = self%comm%total(n_items)
+      call table%order(self%comm)
+    end if
+    call check_table(self, self%group//"/"//table%name, table, error)
+    call self%comm%agree(error)
+    call self%file%reserve(bytes_of_table + bytes_of_word*n_items*table%words(), error)
+    call self%file%make_group(self%group//"/"//table%name, error)
+    call write_fields(self, self%group//"/"//table%name, table, error)
+  end subroutine results_write_step_table
+
+  !> Write tables that stand together in the group `regions` of the step. Collective.
+  subroutine results_write_step_regions(self, region, error)
+    class(results_file_t), intent(inout) :: self
+    !> the same on all ranks
+    type(field_list_t), intent(in) :: region(:)
+    type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: group
-    integer(i8) :: words, room
+    integer(i8) :: bytes
     integer :: k
 
     if (allocated(error)) return
-    group = "/steps/"//to_text(state%step)
-    if (.not. is_finite(state%time)) call raise_not_finite(self, group//", attribute time", "", error)
-    if (allocated(state%accuracy)) then
-      if (.not. (is_finite(state%accuracy%velocity_error) .and. is_finite(state%accuracy%velocity_scale))) &
-        & call raise_not_finite(self, group//", attribute velocity_error or velocity_scale", "", error)
-    end if
-    allocate (sorted(size(state%table)))
-    words = 0
-    do k = 1, size(sorted)
-      call put_in_order(self%comm, state%table(k), sorted(k), words)
-      call check_table(self, group//"/"//sorted(k)%name, sorted(k), error)
+    group = self%group//"/regions"
+    bytes = 0
+    do k = 1, size(region)
+      call check_table(self, group//"/"//region(k)%name, region(k), error)
+      bytes = bytes + bytes_of_table + bytes_of_word*int(region(k)%n_items(), i8)*region(k)%words()
     end do
-    if (allocated(state%figures)) words = words + words_of(state%figures)
-    room = bytes_of_headers
-    if (allocated(state%region)) then
-      do k = 1, size(state%region)
-        call check_table(self, group//"/regions/"//state%region(k)%name, state%region(k), error)
-        words = words + int(state%region(k)%n_items(), i8)*state%region(k)%words()
-        room = room + bytes_of_table
-      end do
-    end if
     call self%comm%agree(error)
-
-    call self%file%reserve(room + bytes_of_word*words, error)
-    call self%file%begin_group(group, error)
-    call self%file%write_attribute(group, "step", state%step, error)
-    call self%file%write_attribute(group, "time", state%time, error)
-    if (allocated(state%accuracy)) then
-      call self%file%write_attribute(group, "velocity_error", state%accuracy%velocity_error, error)
-      call self%file%write_attribute(group, "velocity_scale", state%accuracy%velocity_scale, error)
-    end if
-    do k = 1, size(sorted)
-      call self%file%make_group(group//"/"//sorted(k)%name, error)
-      call write_fields(self, group//"/"//sorted(k)%name, sorted(k), error)
+    call self%file%reserve(bytes, error)
+    call self%file%make_group(group, error)
+    do k = 1, size(region)
+      call self%file%make_group(group//"/"//region(k)%name, error)
+      call write_fields(self, group//"/"//region(k)%name, region(k), error)
     end do
-    if (allocated(state%figures)) call write_figures(self, group//"/diagnostics", state%figures, error)
-    if (allocated(state%region)) then
-      call self%file%make_group(group//"/regions", error)
-      do k = 1, size(state%region)
-        call self%file%make_group(group//"/regions/"//state%region(k)%name, error)
-        call write_fields(self, group//"/regions/"//state%region(k)%name, state%region(k), error)
-      end do
-    end if
+  end subroutine results_write_step_regions
+
+  !> Show the step that was begun; drop it after an error. Collective.
+  subroutine results_end_step(self, error)
+    class(results_file_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
     call finish(self, error)
-  end subroutine results_write_step
-
-  !> A table as it is written, and the words that it takes. Collective.
-  subroutine put_in_order(comm, table, sorted, words)
-    type(communicator_t), intent(in) :: comm
-    type(field_list_t), intent(in) :: table
-    type(field_list_t), intent(inout) :: sorted
-    !> are added to
-    integer(i8), intent(inout) :: words
-
-    if (table%everywhere) then
-      words = words + int(table%n_items(), i8)*table%words()
-      sorted = table
-    else
-      words = words + comm%total(int(table%n_items(), i8))*table%words()
-      call table%order(comm, sorted)
-    end if
-  end subroutine put_in_order
+  end subroutine results_end_step
 
   !> Close; without effect on a file not open. Collective.
   subroutine results_close(self, error)
@@ -336,6 +337,7 @@ contains
 
     if (allocated(error)) then
       call self%file%abandon_group()
+      call self%file%give_back()
     else
       call self%file%commit_group(error)
     end if
@@ -407,14 +409,18 @@ contains
     call file%write_rows(path, values, error)
   end subroutine write_integers
 
-  !> Figures as attributes of a group, and the histograms.
-  subroutine write_figures(self, group, figures, error)
-    type(results_file_t), intent(inout) :: self
-    character(len=*), intent(in) :: group
+  !> Write figures of the step as attributes of its group `diagnostics`, and the histograms there. Collective.
+  subroutine results_write_step_figures(self, figures, error)
+    class(results_file_t), intent(inout) :: self
+    !> the same on all ranks
     type(figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: group
     integer :: k, n
 
+    if (allocated(error)) return
+    group = self%group//"/diagnostics"
+    call self%file%reserve(bytes_of_table + bytes_of_word*int(words_of(figures), i8), error)
     call self%file%make_group(group, error)
     do k = 1, size(figures%value)
       call self%file%write_attribute(group, trim(figures%name(k)), figures%value(k), error)
@@ -426,7 +432,7 @@ contains
         call self%file%write_attribute(group//"/"//histogram%name, "bin_width", histogram%bin_width, error)
       end associate
     end do
-  end subroutine write_figures
+  end subroutine results_write_step_figures
 
   !> Words that figures take.
   pure integer function words_of(figures) result(words)

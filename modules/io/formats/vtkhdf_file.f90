@@ -318,10 +318,9 @@ contains
     integer, intent(in) :: step
     !> s
     real(dp), intent(in) :: time
-    !> items of this rank, with the fields that the file was opened with
-    type(field_list_t), intent(in) :: table
+    !> items of this rank, with the fields that the file was opened with; afterwards in their order
+    type(field_list_t), intent(inout) :: table
     type(error_t), allocatable, intent(inout) :: error
-    type(field_list_t) :: sorted
     integer, allocatable :: corners(:)
     real(dp), allocatable :: part(:, :)
     real(dp) :: now(1, 1)
@@ -331,14 +330,14 @@ contains
     if (allocated(error)) return
     total%rows = self%comm%total(int(table%n_items(), i8))
     if (self%rows + total%rows == 0) return
-    call table%order(self%comm, sorted)
-    call split_points(self, sorted, corners, part)
+    call table%order(self%comm)
+    call split_points(self, table, corners, part)
     total%points = self%comm%total(size(part, 2, kind=i8))
     call self%file%reserve(bytes_of_headers + bytes_of_step(self, total), error)
     call self%file%put_rows(root//"/Points", self%points, part, error)
     do k = 1, size(self%field)
       associate (name => root//"/"//data_group(self)//"/"//trim(self%field(k)%name), &
-        & field => sorted%field(first_field(sorted) + k - 1))
+        & field => table%field(first_field(table) + k - 1))
         if (self%field(k)%whole) then
           call self%file%put_rows(name, self%rows, field%whole, error)
         else

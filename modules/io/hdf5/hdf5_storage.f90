@@ -12,7 +12,7 @@ module gravier_hdf5_storage
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_disk_space, only: reserve_space, extend_file
+  use gravier_disk_space, only: reserve_space, give_back_space, extend_file
   use gravier_file_system, only: check_readable, check_creatable, file_length, remove_file, replace_file
   use gravier_own_files, only: part_of, give_name, note_own
   use gravier_hdf5_properties, only: start_library, parallel_access, ask_for_one_block
@@ -44,6 +44,7 @@ module gravier_hdf5_storage
     procedure :: discard => h5_discard
     procedure :: flush => h5_flush
     procedure :: reserve => h5_reserve
+    procedure :: give_back => h5_give_back
     procedure :: is_open => h5_is_open
     procedure :: length => h5_length
 
@@ -335,6 +336,14 @@ contains
     end if
     call self%comm%agree(error)
   end subroutine h5_reserve
+
+  !> Give back what was reserved since the last flush, where what it was for is not written after all. Collective.
+  subroutine h5_give_back(self)
+    class(h5_storage_t), intent(inout) :: self
+
+    if (self%comm%rank == 0 .and. self%id >= 0 .and. self%reserved > 0) call give_back_space(self%path)
+    self%reserved = 0
+  end subroutine h5_give_back
 
   pure logical function h5_is_open(self) result(is_open)
     class(h5_storage_t), intent(in) :: self

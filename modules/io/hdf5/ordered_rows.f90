@@ -1,12 +1,28 @@
 !> Rows of a table put in an order of their own, so that a file does not show how many ranks wrote it.
 module gravier_ordered_rows
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_communicator, only: communicator_t
-  use gravier_sorting, only: argsort_rows
-  use gravier_sparse_exchange, only: sparse_exchange
+  use gravier_sorting, only: argsort, argsort_rows
+  use gravier_sparse_exchange, only: exchange_sorted
   implicit none
   private
-  public :: order_rows, pack_reals, unpack_reals
+  public :: row_order_t, order_rows, pack_reals, unpack_reals
+
+  !> How the rows of all ranks go to the places that their keys give them. It is found once for a table; the columns of the table
+  !> are then put in the order one after the other, which takes memory for a column and not for the table.
+  type :: row_order_t
+    private
+    type(communicator_t) :: comm
+    !> (rows before), on several ranks: the rows in the order in which they are sent, and the rank to which each then goes
+    integer, allocatable :: leaving(:), target_rank(:)
+    !> (rows after): where the ordered rows stand among those that have come
+    integer, allocatable :: place(:)
+  contains
+    procedure :: find => row_order_find
+    procedure :: put_words => row_order_put_words
+    procedure :: put_reals => row_order_put_reals
+  end type row_order_t
 
 contains
 
@@ -43,73 +59,130 @@ contains
     end do
   end subroutine unpack_reals
 
-  !> Sort records over all ranks by their first words. Afterwards rank 0 holds the first block, rank 1 the next; the
-  !> blocks are equal but for rows with the same first word, which stay together. Collective.
+  !> Find the order of rows by their keys, and put the keys in this order: rank 0 then holds the first block, rank 1 the next. The
+  !> blocks are equal but for rows with the same first key, which stay together. Rows with the same keys stand in the order of
+  !> their ranks and their places there. Collective.
+  subroutine row_order_find(self, comm, key)
+    class(row_order_t), intent(out) :: self
+    type(communicator_t), intent(in) :: comm
+    !> (keys, rows): the first key counts most and must be >= 0; afterwards those of the ordered rows of this rank
+    integer(i8), allocatable, intent(inout) :: key(:, :)
+    integer(i8), allocatable :: destination(:), splitters(:)
+    integer :: i
+
+    self%comm = comm
+    if (comm%size > 1) then
+      call find_splitters(comm, key(1, :), splitters)
+      allocate (destination(size(key, 2)), self%leaving(size(key, 2)), self%target_rank(size(key, 2)))
+      do i = 1, size(destination)
+        destination(i) = count_up_to(splitters, key(1, i) - 1)
+      end do
+      call argsort(destination, self%leaving)
+      do i = 1, size(destination)
+        self%target_rank(i) = narrow(destination(self%leaving(i)))
+      end do
+      deallocate (destination)
+      call send_rows(self, key)
+    end if
+    allocate (self%place(size(key, 2)))
+    call argsort_rows(key, self%place)
+    call place_rows(self, key)
+  end subroutine row_order_find
+
+  !> Put rows of integers, or of any words, in the order. Collective.
+  subroutine row_order_put_words(self, words)
+    class(row_order_t), intent(in) :: self
+    !> (words of a row, rows): those of this rank before; afterwards those of its block
+    integer(i8), allocatable, intent(inout) :: words(:, :)
+
+    if (self%comm%size > 1) call send_rows(self, words)
+    call place_rows(self, words)
+  end subroutine row_order_put_words
+
+  !> Put rows of reals in the order, bit by bit. No more than three copies of them are in memory at any time. Collective.
+  subroutine row_order_put_reals(self, values)
+    class(row_order_t), intent(in) :: self
+    !> (components, rows): those of this rank before; afterwards those of its block
+    real(dp), allocatable, intent(inout) :: values(:, :)
+    integer(i8), allocatable :: words(:, :)
+
+    allocate (words(size(values, 1), size(values, 2)))
+    call pack_reals(size(values, 1), values, 1, words)
+    deallocate (values)
+    call self%put_words(words)
+    call unpack_reals(words, 1, size(words, 1), values)
+  end subroutine row_order_put_reals
+
+  !> Send each row to the rank whose block it is in.
+  subroutine send_rows(self, words)
+    class(row_order_t), intent(in) :: self
+    !> (words of a row, rows)
+    integer(i8), allocatable, intent(inout) :: words(:, :)
+    integer(i8), allocatable, asynchronous :: outgoing(:, :)
+    integer :: i
+
+    allocate (outgoing(size(words, 1), size(words, 2)))
+    do i = 1, size(self%leaving)
+      outgoing(:, i) = words(:, self%leaving(i))
+    end do
+    deallocate (words)
+    call exchange_sorted(self%comm, outgoing, self%target_rank, words)
+  end subroutine send_rows
+
+  !> Put the rows that have come in their order.
+  pure subroutine place_rows(self, words)
+    class(row_order_t), intent(in) :: self
+    !> (words of a row, rows)
+    integer(i8), allocatable, intent(inout) :: words(:, :)
+    integer(i8), allocatable :: placed(:, :)
+    integer :: i
+
+    allocate (placed(size(words, 1), size(words, 2)))
+    do i = 1, size(self%place)
+      placed(:, i) = words(:, self%place(i))
+    end do
+    call move_alloc(placed, words)
+  end subroutine place_rows
+
+  !> Sort records over all ranks by their first words, in the order of row_order_t. Collective.
   subroutine order_rows(comm, n_keys, records, ordered)
     type(communicator_t), intent(in) :: comm
-    !> the order is that of words 1 to n_keys, the first one counting most; word 1 must be >= 0
+    !> words 1 to n_keys are the keys
     integer, intent(in) :: n_keys
     !> (words of a record, number of records); deallocated at the end
     integer(i8), allocatable, intent(inout) :: records(:, :)
     integer(i8), allocatable, intent(out) :: ordered(:, :)
+    type(row_order_t) :: order
+    integer(i8), allocatable :: key(:, :)
 
-    integer(i8), allocatable :: sorted(:, :), first_keys(:), splitters(:), received(:, :)
-    integer, allocatable :: destination(:)
-    integer :: i, r
-
-    call sort_rows(n_keys, records, sorted)
-    if (comm%size == 1) then
-      call move_alloc(sorted, ordered)
-      return
-    end if
-    first_keys = sorted(1, :)
-    call find_splitters(comm, first_keys, splitters)
-    allocate (destination(size(sorted, 2)))
-    r = 0
-    do i = 1, size(sorted, 2)
-      do while (r < comm%size - 1)
-        if (first_keys(i) <= splitters(r + 1)) exit
-        r = r + 1
-      end do
-      destination(i) = r
-    end do
-    call sparse_exchange(comm, sorted, destination, received)
-    deallocate (sorted)
-    call sort_rows(n_keys, received, ordered)
+    allocate (key(n_keys, size(records, 2)))
+    key(:, :) = records(1:n_keys, :)
+    call order%find(comm, key)
+    deallocate (key)
+    call order%put_words(records)
+    call move_alloc(records, ordered)
   end subroutine order_rows
-
-  !> Sort the local records, which are deallocated.
-  subroutine sort_rows(n_keys, records, sorted)
-    integer, intent(in) :: n_keys
-    integer(i8), allocatable, intent(inout) :: records(:, :)
-    integer(i8), allocatable, intent(out) :: sorted(:, :)
-    integer(i8), allocatable :: keys(:, :)
-    integer, allocatable :: order(:)
-    integer :: i
-
-    allocate (keys(n_keys, size(records, 2)), order(size(records, 2)))
-    keys(:, :) = records(1:n_keys, :)
-    call argsort_rows(keys, order)
-    deallocate (keys)
-    allocate (sorted(size(records, 1), size(records, 2)))
-    do i = 1, size(order)
-      sorted(:, i) = records(:, order(i))
-    end do
-    deallocate (records)
-  end subroutine sort_rows
 
   !> Last key of each block but that of the last rank, by bisection on the value of all of them together: the least
   !> value that as many keys do not exceed as the blocks up to it should hold.
-  subroutine find_splitters(comm, keys, splitters)
+  subroutine find_splitters(comm, unsorted, splitters)
     type(communicator_t), intent(in) :: comm
-    !> ascending, >= 0
-    integer(i8), intent(in), contiguous :: keys(:)
+    !> >= 0
+    integer(i8), intent(in) :: unsorted(:)
     !> (comm%size - 1)
     integer(i8), allocatable, intent(out) :: splitters(:)
-    integer(i8), allocatable :: lower(:), upper(:), middle(:), counts(:)
+    integer(i8), allocatable :: keys(:), lower(:), upper(:), middle(:), counts(:)
+    integer, allocatable :: order(:)
     integer(i8) :: total
     integer :: k
 
+    allocate (keys(size(unsorted)), order(size(unsorted)))
+    keys(:) = unsorted
+    call argsort(keys, order)
+    do k = 1, size(keys)
+      keys(k) = unsorted(order(k))
+    end do
+    deallocate (order)
     total = comm%total(size(keys, kind=i8))
     allocate (lower(comm%size - 1), source=0_i8)
     allocate (upper(comm%size - 1), source=upper_bound(comm, keys))

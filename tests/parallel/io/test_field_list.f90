@@ -61,7 +61,7 @@ contains
   !> Items fall to ranks by their number; ordered they are in the order of their keys, and each has its own numbers.
   subroutine test_order(n_keys)
     integer, intent(in) :: n_keys
-    type(field_list_t) :: table, sorted
+    type(field_list_t) :: table
     real(dp), allocatable :: value(:, :)
     integer(i8), allocatable :: whole(:, :)
     integer(i8) :: before
@@ -88,35 +88,35 @@ contains
     end do
     call table%add_reals("value", "s", value)
     call table%add_whole("whole", "", whole, .true.)
-    call table%order(world, sorted)
-    call check_equal(world%total(int(sorted%n_items(), i8)), int(n_items, i8), "no item is lost")
-    call check_equal(sorted%name, "items", "name")
-    call check_equal(size(sorted%key, 1), n_keys, "keys")
-    call check_equal(trim(sorted%key_name(n_keys)), trim(table%key_name(n_keys)), "name of the last key")
-    call check_equal(sorted%field(1)%name//" "//sorted%field(1)%unit, "value s", "name and unit of a field")
-    call check(sorted%field(2)%scalar .and. .not. sorted%field(1)%scalar, "shapes")
-    before = world%offset(int(sorted%n_items(), i8))
+    call table%order(world)
+    call check_equal(world%total(int(table%n_items(), i8)), int(n_items, i8), "no item is lost")
+    call check_equal(table%name, "items", "name")
+    call check_equal(size(table%key, 1), n_keys, "keys")
+    call check_equal(trim(table%key_name(n_keys)), merge("id ", "two", n_keys == 1), "name of the last key")
+    call check_equal(table%field(1)%name//" "//table%field(1)%unit, "value s", "name and unit of a field")
+    call check(table%field(2)%scalar .and. .not. table%field(1)%scalar, "shapes")
+    before = world%offset(int(table%n_items(), i8))
     same = .true.
-    do g = 1, sorted%n_items()
-      same = same .and. sorted%key(n_keys, g) == before + g
-      same = same .and. abs(sorted%field(1)%value(1, g) - 0.5_dp*sorted%key(n_keys, g)) <= 0.0_dp
-      same = same .and. abs(sorted%field(1)%value(2, g) + 1.5_dp*sorted%key(n_keys, g)) <= 0.0_dp
-      same = same .and. sorted%field(2)%whole(1, g) == 100*sorted%key(n_keys, g)
+    do g = 1, table%n_items()
+      same = same .and. table%key(n_keys, g) == before + g
+      same = same .and. abs(table%field(1)%value(1, g) - 0.5_dp*table%key(n_keys, g)) <= 0.0_dp
+      same = same .and. abs(table%field(1)%value(2, g) + 1.5_dp*table%key(n_keys, g)) <= 0.0_dp
+      same = same .and. table%field(2)%whole(1, g) == 100*table%key(n_keys, g)
     end do
     call check(same, "items in the order of their keys, each with its numbers")
   end subroutine test_order
 
   !> No rank has an item.
   subroutine test_no_items()
-    type(field_list_t) :: table, sorted
+    type(field_list_t) :: table
     real(dp), allocatable :: value(:, :)
 
     call table%init("nothing", "id", 0)
     allocate (value(3, 0))
     call table%add_reals("value", "m", value)
-    call table%order(world, sorted)
-    call check_equal(sorted%n_items(), 0, "nothing is ordered")
-    call check_equal(sorted%field(1)%components(), 3, "and keeps its shape")
+    call table%order(world)
+    call check_equal(table%n_items(), 0, "nothing is ordered")
+    call check_equal(table%field(1)%components(), 3, "and keeps its shape")
   end subroutine test_no_items
 
 end program test_field_list

@@ -2,7 +2,7 @@
 program test_io_ordered_rows
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_ordered_rows, only: order_rows, pack_reals, unpack_reals
+  use gravier_ordered_rows, only: row_order_t, order_rows, pack_reals, unpack_reals
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
   type(communicator_t) :: comm
@@ -17,6 +17,7 @@ program test_io_ordered_rows
   call test_scattered(100, 1_i8, 9000000000000000000_i8)
   call test_two_clusters()
   call test_ties()
+  call test_columns()
   call test_nothing()
   call test_reals()
   call finish_checks()
@@ -110,6 +111,40 @@ contains
       call check_equal(ordered(3, i), first + i - 1, "ties: number of a row")
     end do
   end subroutine test_ties
+
+  !> Columns put in the order one by one stand as whole records do, rows with the same two keys included: these stay in the order of
+  !> their ranks, and on a rank in theirs.
+  subroutine test_columns()
+    type(row_order_t) :: order
+    integer(i8), allocatable :: records(:, :), ordered(:, :), key(:, :), number(:, :)
+    real(dp), allocatable :: value(:, :)
+    integer(i8) :: before
+    integer :: i
+
+    call scatter(90, 1_i8, 0_i8, records)
+    before = comm%offset(size(records, 2, kind=i8))
+    allocate (key(2, size(records, 2)), number(1, size(records, 2)), value(2, size(records, 2)))
+    do i = 1, size(records, 2)
+      number(1, i) = before + i
+      value(:, i) = [0.1_dp, -0.7_dp]*real(before + i, dp)
+      key(1, i) = mod(records(3, i), 7_i8)
+      key(2, i) = mod(records(3, i)/7, 3_i8)
+      records(1:2, i) = key(:, i)
+      records(3, i) = number(1, i)
+    end do
+    call order%find(comm, key)
+    call order%put_words(number)
+    call order%put_reals(value)
+    call order_rows(comm, 2, records, ordered)
+    call check_equal(size(number, 2), size(ordered, 2), "columns: rows of the rank")
+    call check(all(key == ordered(1:2, :)), "columns: keys")
+    call check(all(number(1, :) == ordered(3, :)), "columns: words")
+    do i = 1, size(number, 2)
+      call check(all(same(value(:, i), [0.1_dp, -0.7_dp]*real(number(1, i), dp))), "columns: reals bit by bit")
+      if (i == 1) cycle
+      if (all(key(:, i) == key(:, i - 1))) call check(number(1, i) > number(1, i - 1), "columns: rows with the same keys")
+    end do
+  end subroutine test_columns
 
   subroutine test_nothing()
     integer(i8), allocatable :: records(:, :), ordered(:, :)

@@ -7,7 +7,7 @@ program test_io_file_system
   use gravier_file_system, only: make_directory, check_directory, is_directory, remove_directory, rename_file, &
     & replace_file, remove_file, check_readable, check_creatable, is_device, place_t, place_of, &
     & place_of_open
-  use gravier_disk_space, only: reserve_space, extend_file
+  use gravier_disk_space, only: reserve_space, give_back_space, extend_file
   use gravier_system_calls, only: c_open, c_close, c_text, o_rdonly
   use gravier_own_files, only: part_of, give_name, note_own, remove_own, check_own_files, forget_own_files
   use gravier_text_file, only: text_file_t
@@ -299,6 +299,10 @@ contains
     call reserve_space(here//"/reserved", 0_i8, error)
     call expect_none(error, "reservation")
     call check_equal(content(here//"/reserved"), "12345", "a reservation leaves the file as it is")
+    call give_back_space(here//"/reserved")
+    call check_equal(content(here//"/reserved"), "12345", "and so does giving it back")
+    call give_back_space(here//"/nowhere")
+    call check_equal(is_there(here//"/nowhere"), 0, "nothing is made where nothing was reserved")
     call reserve_space(here//"/nowhere", 1_i8, error)
     call expect(error, status_failure, "nowhere: cannot write to this file: No such file", "reservation for no file")
     ! 4 EiB: more than any disk
@@ -307,6 +311,15 @@ contains
       & "reservation of more than there is")
     call check_equal(content(here//"/reserved"), "12345", "the file after a reservation refused")
   end subroutine test_reservation
+
+  !> 1 where there is a file, 0 where there is none.
+  integer function is_there(path)
+    character(len=*), intent(in) :: path
+    logical :: exists
+
+    inquire (file=path, exist=exists)
+    is_there = merge(1, 0, exists)
+  end function is_there
 
   function content(path) result(text)
     character(len=*), intent(in) :: path
