@@ -438,7 +438,7 @@ contains
     if (suspended > 0) call warn(self, warn_acceleration, suspended, "warning     accelerated sweeps make no progress: "// &
       & "Nesterov momentum suspended "//times_text(suspended)//" in step "//to_text(step), error)
     if (relaxed > 0) call warn(self, warn_relaxation, relaxed, &
-      & "warning     the changes of the neighbours' impulses alternate in sign and grow: relaxation factor lowered "// &
+      & "warning     the changes of the neighbours' impulses alternate in sign and do not fall: relaxation factor lowered "// &
       & times_text(relaxed)//" in step "//to_text(step), error)
   end subroutine write_recoveries
 

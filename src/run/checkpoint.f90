@@ -56,7 +56,7 @@ contains
     end do
     text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
     text = text//"files: names"//newline//"loop: names of settings"//newline
-    text = text//"partition: "//head_record//", "//to_text(head_words)//" words"
+    text = text//"partition: "//head_record//", "//to_text(head_words)//" words; division"
   end function records_text
 
   !> Write a checkpoint, in the place of an older one when it is complete. Collective; errors are the same on all ranks.
@@ -128,6 +128,7 @@ contains
     call save_diagnostics(simulation%diagnostics, file, error)
     call simulation%decomposition%partition%get_head(words)
     call file%write_array("partition", words, error)
+    call file%write_text("division", simulation%division%text(), error)
     call save_tables(simulation, file, error)
     call file%commit(error)
   end subroutine save_checkpoint
@@ -143,6 +144,7 @@ contains
     integer :: own_step, own_last, own_quiet
     real(dp) :: rest_energy
     integer(i8), allocatable :: words(:)
+    character(len=:), allocatable :: division
 
     if (allocated(error)) return
     call file%open(simulation%comm, path, records_text(), error)
@@ -151,6 +153,7 @@ contains
     call check_steps(simulation, step, path, error)
     call file%read_text("files", simulation%files, error)
     call file%read_text("set_by_loop", simulation%set_before, error)
+    call file%read_text("division", division, error)
     call file%read_scalar("time", simulation%time, error)
     call file%read_scalar("grains", simulation%n_grains, error)
     call file%read_scalar("glued", simulation%n_glued, error)
@@ -191,6 +194,7 @@ contains
     ! steps that were at rest by another measure do not count
     if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp) simulation%quiet = own_quiet
     simulation%restarted = .true.
+    simulation%division%overdue = division /= simulation%division%text() .and. simulation%division%subdomains > 1
     simulation%set_before = simulation%set_before(len(settings_mark) + 1:)
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)

@@ -259,6 +259,17 @@ class Restart(RunTestCase):
         for stop in (4, 7, 11):
             self.one_restart(case, stop, 1, 2, straight, chains)
 
+    def test_another_partition(self):
+        """A restart with other boxes, or with METIS, divides space in its first step and no more; one with the same boxes does not."""
+        case = merged(BOX, {"decomposition": {"subdomains": 4, "grid": [4, 1]}, "output": {"every": 0}})
+        directory = self.here("partition")
+        self.assert_status(run_case(merged(case, {"time": {"steps": 8}}), 2, directory), 0)
+        for steps, change in ((16, {"grid": [2, 2]}), (24, {"grid": [2, 2]}), (32, {"grid": None, "partition": "metis"})):
+            run = run_case(merged(case, {"time": {"steps": steps}, "decomposition": change}), 2, directory, options=["--restart"])
+            self.assert_status(run, 0)
+        history = run.history()
+        self.assertEqual(list(history["step"][history["divided"] == 1]), [9, 25])
+
     def test_walltime(self):
         """The run stops before its time is over, and goes on."""
         case = merged(BOX, {"time": {"steps": 100000}, "output": {"every": 0, "checkpoint_every": 0, "walltime": 2.5}})

@@ -43,6 +43,26 @@ class Relaxation(RunTestCase):
                 self.assertGreater(len(paper.trace()["iteration"]), 20)
                 self.assertEqual(differences(paper.trace(), automatic.trace()), [])
 
+    def test_lid(self):
+        """Under a light lid that three subdomains share the loads go to and fro within bounds: the factor falls, and all solves get
+        there, in a tenth of the iterations after which others would be in vain."""
+        lid = {
+            "scene": {"bodies": "lattice", "lattice_count": [8, 5], "radius_min": 0.004, "radius_max": 0.006, "gravity": [0, -5]},
+            "boundary": {"name": "lid", "shape": "plane", "point": [0, 0.07], "normal": [0, -1], "free": [False, True],
+                         "mass": 0.05, "force": [0, -20]},
+            "time": {"step": 1e-3, "steps": 10},
+            "solver": {"method": "schwarz", "fallback": "none"},
+            "decomposition": {"grid": [3, 1]},
+        }
+        rolling = {"scene": {"friction": 0.3, "rolling_friction": 0.05}}
+        cases = {"smooth": lid, "rolling": merged(lid, rolling), "enriched": merged(lid, {"solver": {"method": "schwarz_ec"}})}
+        runs = each(lambda title: run_case(cases[title], 1, self.here(f"lid_{title}")), [(title,) for title in cases])
+        for title, run in zip(cases, runs):
+            with self.subTest(title):
+                self.assert_status(run, 0)
+                self.assertLess(run.history()["iterations"].max(), 200)
+        self.assertIn("alternate in sign and do not fall", runs[0].stdout)
+
     def packed(self, dimension, packing, subdomains, *more):
         return merged({
             "scene": {"dimension": dimension, "bodies": "file", "bodies_file": packing, "friction": 0.3},

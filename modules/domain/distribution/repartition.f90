@@ -2,6 +2,7 @@
 module gravier_repartition
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_text, only: to_text
   use gravier_body_store, only: body_set_t
   use gravier_box_counts, only: choose_boxes, check_subdomains
   use gravier_partition, only: partition_t
@@ -22,6 +23,10 @@ module gravier_repartition
     integer :: every = 0
     !> largest over mean number of contacts of a subdomain that asks for a new division, 0 for none
     real(dp) :: imbalance = 0.0_dp
+    !> space is divided in another way than this, by a run before a restart: the next step divides it
+    logical :: overdue = .false.
+  contains
+    procedure :: text => repartition_rule_text
   end type repartition_rule_t
 
   !> times the imbalance that the last division reached: one that is worth another division
@@ -29,16 +34,30 @@ module gravier_repartition
 
 contains
 
-  !> Whether step `step` starts from a new partition: by schedule, or because contacts lie unevenly, and more so than just after
-  !> the last one: what that could not cure is not tried again.
+  !> How space is divided, in a word or a few: two rules with the same text divide it in the same way.
+  pure function repartition_rule_text(self) result(text)
+    class(repartition_rule_t), intent(in) :: self
+    character(len=:), allocatable :: text
+    integer :: d
+
+    text = "metis"
+    if (self%by_graph) return
+    text = "grid"
+    do d = 1, size(self%grid)
+      text = text//" "//to_text(self%grid(d))
+    end do
+  end function repartition_rule_text
+
+  !> Whether step `step` starts from a new partition: because one is overdue, by schedule, or because contacts lie unevenly, and
+  !> more so than just after the last one: what that could not cure is not tried again.
   pure logical function repartition_is_due(rule, step, imbalance, reached) result(due)
     type(repartition_rule_t), intent(in) :: rule
     integer, intent(in) :: step
     !> largest over mean number of contacts of a subdomain: in the last step, and just after the last division
     real(dp), intent(in) :: imbalance, reached
 
-    due = .false.
-    if (step == 0 .or. rule%subdomains == 1) return
+    due = rule%overdue
+    if (step == 0 .or. rule%subdomains == 1 .or. due) return
     if (rule%every > 0) due = mod(step, rule%every) == 0
     if (rule%imbalance > 0.0_dp) due = due .or. imbalance > max(rule%imbalance, worth_dividing*reached)
   end function repartition_is_due
@@ -91,7 +110,8 @@ contains
   !> Divide space anew; where that cannot be, as in a scene that has come to fill fewer cells than there are subdomains, the old
   !> partition stays. Collective.
   subroutine repartition(rule, halo, decomposition, refusal)
-    type(repartition_rule_t), intent(in) :: rule
+    !> is not overdue afterwards
+    type(repartition_rule_t), intent(inout) :: rule
     type(halo_t), intent(in) :: halo
     type(decomposition_t), intent(inout) :: decomposition
     !> why it stays; not allocated where space was divided
@@ -100,6 +120,7 @@ contains
     type(partition_t) :: old
     type(error_t), allocatable :: error
 
+    rule%overdue = .false.
     old = decomposition%partition
     call move_alloc(decomposition%owned, bodies)
     call divide(rule, halo, bodies, decomposition, error)

@@ -17,6 +17,10 @@ module gravier_schwarz
   real(dp), parameter :: unknown = 0.1_dp*huge(1.0_dp)
   !> growth of the alternating part of the changes that lowers the factor, and what is left of it then
   real(dp), parameter :: growth_allowed = 2.0_dp, factor_kept = 0.8_dp
+  !> a cycle: changes that go back at least this fraction of the change before, iteration after iteration, so many times, without an
+  !> alternating part below `progress` times that of the first of them
+  real(dp), parameter :: way_back = 0.5_dp, progress = 0.8_dp
+  integer, parameter :: idle_iterations = 20
 
   !> Loads of the neighbours on the shared bodies of one subdomain, each (nv, n_shared) [N s, N m s].
   type :: neighbour_load_t
@@ -30,7 +34,8 @@ module gravier_schwarz
 
   !> The relaxation factor, the fraction of a change of R^ddm that is applied: 1 in the paper, less where the method would
   !> diverge. It does so by changes d_k that alternate from one iteration to the next, and grow: where |d_k - d_k-1|^2 is more
-  !> than twice its lowest value so far, and d_k no longer goes along with d_k-1, the automatic factor is lowered, see
+  !> than twice its lowest value so far, and d_k no longer goes along with d_k-1, the automatic factor is lowered. Impulses that
+  !> cannot be negative bound the growth: the factor is lowered too where the changes go to and fro and do not fall. See
   !> doc/theory.md section 9.
   type :: relaxation_t
     !> in (0, 1]
@@ -41,12 +46,16 @@ module gravier_schwarz
     logical :: watched = .false.
     !> the automatic factor is not lowered beyond this
     real(dp) :: least = 1.0_dp
-    !> by the last `adapt`, the changes alternate and grow
+    !> by the last `adapt`, the changes alternate, and grow or stay
     logical :: grows = .false.
     !> |d|^2 of the last iteration, negative before the first, and lowest |d_k - d_k-1|^2 since the factor was lowered [J]
     real(dp) :: last = -1.0_dp, lowest = unknown
+    !> iterations in a row that went back, and |d_k - d_k-1|^2 of the last of them that had made progress [J]
+    integer, private :: idle = 0
+    real(dp), private :: mark = unknown
   contains
     procedure :: adapt => relaxation_adapt
+    procedure, private :: note_cycle => relaxation_note_cycle
   end type relaxation_t
 
   type, extends(method_t) :: schwarz_t
@@ -247,7 +256,7 @@ contains
     end do
   end subroutine take_neighbour_loads
 
-  !> Whether the changes of the loads alternate and grow; the automatic factor is lowered then.
+  !> Whether the changes of the loads alternate, and grow or stay; the automatic factor is lowered then.
   pure subroutine relaxation_adapt(self, change, product)
     class(relaxation_t), intent(inout) :: self
     !> |d_k|^2 and d_k . d_k-1 over all subdomains, 0 in the first iteration [J]
@@ -258,13 +267,30 @@ contains
     if (self%last >= 0.0_dp) then
       alternating = change + self%last - 2.0_dp*product
       self%grows = alternating > growth_allowed*self%lowest .and. 2.0_dp*product < self%last
+      call self%note_cycle(alternating, product)
       if (self%grows) then
         if (self%automatic) self%factor = max(self%least, factor_kept*self%factor)
         self%lowest = alternating
+        self%idle = 0
       end if
       self%lowest = min(self%lowest, alternating)
     end if
     self%last = change
   end subroutine relaxation_adapt
+
+  !> Count the iterations of a cycle, and take a long one for growth.
+  pure subroutine relaxation_note_cycle(self, alternating, product)
+    class(relaxation_t), intent(inout) :: self
+    !> |d_k - d_k-1|^2 and d_k . d_k-1 [J]
+    real(dp), intent(in) :: alternating, product
+
+    if (product < -way_back*self%last .and. self%idle > 0 .and. alternating > progress*self%mark) then
+      self%idle = self%idle + 1
+    else
+      self%idle = merge(1, 0, product < -way_back*self%last)
+      self%mark = alternating
+    end if
+    if (self%idle > idle_iterations) self%grows = .true.
+  end subroutine relaxation_note_cycle
 
 end module gravier_schwarz

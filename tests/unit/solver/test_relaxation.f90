@@ -11,6 +11,7 @@ program test_relaxation
   call test_smooth_growth()
   call test_alternating_growth()
   call test_growth_that_stops()
+  call test_cycle()
   call finish_checks()
   call MPI_Finalize()
 
@@ -84,5 +85,32 @@ contains
     call check_close(relaxation%factor, 0.8_dp, 0.0_dp, "growth that stops: the factor")
     call check(abs(d) < 1e-3_dp, "growth that stops: the mode")
   end subroutine test_growth_that_stops
+
+  !> Changes that go to and fro and neither grow nor fall lower the factor, once in 20 iterations; those that fall by a hundredth
+  !> each time, or pause, do not.
+  subroutine test_cycle()
+    type(relaxation_t) :: relaxation
+    integer :: k
+
+    relaxation = relaxation_t(least=0.1_dp)
+    call follow(relaxation, 0.0_dp, 1.0_dp, -1.0_dp, 1, 21)
+    call check_close(relaxation%factor, 1.0_dp, 0.0_dp, "a cycle: not before 20 iterations")
+    call follow(relaxation, 0.0_dp, 1.0_dp, -1.0_dp, 22, 22)
+    call check(relaxation%grows, "a cycle: changes that stay")
+    call check_close(relaxation%factor, 0.8_dp, 0.0_dp, "a cycle: after 20 iterations")
+    call follow(relaxation, 0.0_dp, 1.0_dp, -1.0_dp, 23, 42)
+    call check_close(relaxation%factor, 0.8_dp, 0.0_dp, "a cycle: not before 20 more")
+    call follow(relaxation, 0.0_dp, 1.0_dp, -1.0_dp, 43, 43)
+    call check_close(relaxation%factor, 0.64_dp, 1e-15_dp, "a cycle: and again")
+    relaxation = relaxation_t(least=0.1_dp)
+    call follow(relaxation, 0.0_dp, 1.0_dp, -0.99_dp, 1, 400)
+    call check_close(relaxation%factor, 1.0_dp, 0.0_dp, "changes that fall by a hundredth")
+    relaxation = relaxation_t(least=0.1_dp)
+    call relaxation%adapt(1.0_dp, 0.0_dp)
+    do k = 1, 100
+      call relaxation%adapt(1.0_dp, merge(-0.4_dp, -1.0_dp, mod(k, 10) == 0))
+    end do
+    call check_close(relaxation%factor, 1.0_dp, 0.0_dp, "changes that pause now and then")
+  end subroutine test_cycle
 
 end program test_relaxation

@@ -51,6 +51,7 @@ contains
   subroutine test_division()
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4), 7, 9.0_dp, 1.0_dp), "never without a rule")
     call check(repartition_is_due(repartition_rule_t(subdomains=4, every=5), 10, 1.0_dp, 1.0_dp), "each fifth step")
+    call check(repartition_is_due(repartition_rule_t(subdomains=4, overdue=.true.), 7, 1.0_dp, 1.0_dp), "overdue")
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, every=5), 11, 1.0_dp, 1.0_dp), "not in between")
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, every=5), 0, 9.0_dp, 1.0_dp), "not in step 0")
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=1, every=5), 10, 9.0_dp, 1.0_dp), "not of one subdomain")
