@@ -272,7 +272,7 @@ contains
       & figures%interface_statistics)
     call start_timer(phase_setup)
     if (self%given%total > 0) then
-      call take_given_impulses(self%given, self%decomposition, self%physics%h, self%problem, self%halo, figures%started)
+      call take_given_impulses(self%given, self%decomposition, self%physics, self%problem, self%halo, figures%started)
       self%given = given_contacts_t()
     end if
     if (self%warm_start) call recall_impulses(self%halo, self%problem)

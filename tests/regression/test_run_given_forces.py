@@ -89,6 +89,55 @@ class GivenForces(RunTestCase):
             # without them every run starts from the same
             np.testing.assert_allclose(kept, kept[0], rtol=1e-12)
 
+    def test_springs_that_are_stretched(self):
+        """The same disk on springs that it presses by N/k: each share of its weight that given forces carry along the flanks stays
+        with the tangential springs, for twenty steps and over a restart, and nothing is dissipated. Without forces the springs begin
+        unstretched, and the disk sinks."""
+        stiffness, ratio, steps = 1e5, 0.5, 20
+        for dimension, kind in ((2, "elastic"), (3, "elastic"), (3, "hertz")):
+            law = {"materials": ["m"], "kind": kind, "friction": 0.6}
+            if kind == "elastic":
+                law.update(normal_stiffness=stiffness, stiffness_ratio=ratio)
+            else:
+                law.update(young_modulus=1e7, poisson_ratio=0.3)
+            for part in (-0.1, 0.1):
+                bodies, boundaries, contacts = wedge(dimension, part)
+                normal = contacts["force"][0] @ contacts["normal"][0]
+                depth = normal / stiffness
+                if kind == "hertz":
+                    # E* of two bodies of the same kind, and the radius of the sphere on a plane
+                    depth = (0.75 * normal / (1e7 / (2 * (1 - 0.09)) * np.sqrt(0.1))) ** (2 / 3)
+                bodies["position"] = [np.array(bodies["position"][0]) * (1 - depth / 0.1)]
+                groups = {"scene": {"dimension": dimension, "wall_material": "m"}, "material": {"name": "m"}, "law": law,
+                          "boundary": boundaries, "time": {"steps": steps}, "solver": {"accuracy": 1e-9},
+                          "output": {"energy": True, "checkpoint_every": steps}}
+                moved = {}
+                for given in (True, False):
+                    name = f"springs_{dimension}_{kind}_{part}_{given}"
+                    write_bodies(self.here(name + ".h5"), bodies, None, contacts if given else None, ("left", "right") if given else ())
+                    run = self.start(name, groups, self.here(name + ".h5"))
+                    self.assert_status(run, 0)
+                    moved[given] = np.linalg.norm(run.results()[f"/steps/{steps}/bodies/position"][0] - bodies["position"][0])
+                    if given:
+                        rested = run
+                with self.subTest(dimension=dimension, kind=kind, part=part):
+                    self.assertLess(moved[True], 1e-6 * depth)
+                    self.assertGreater(moved[False], 1e-2 * depth)
+                    found = rested.results()
+                    size = np.linalg.norm(found[f"/steps/{steps}/contacts/impulse"][:, 1:], axis=1)
+                    np.testing.assert_allclose(size, abs(part) * bodies["mass"][0] * G * STEP, rtol=1e-5)
+                    history = rested.history()
+                    stored = history["elastic_energy"][-1]
+                    self.assertGreater(stored, 0.0)
+                    for column in ("dissipated_normal", "dissipated_friction", "energy_error"):
+                        self.assertLess(np.abs(history[column]).max(), 1e-5 * stored, column)
+                    # an account that begins at a restart begins with what the springs hold
+                    again = merged(groups, {"time": {"steps": 2 * steps}})
+                    os.remove(rested.path("results", "history.csv"))
+                    run = self.start(os.path.basename(rested.directory), again, self.here(os.path.basename(rested.directory) + ".h5"), options=["--restart"])
+                    self.assert_status(run, 0)
+                    self.assertLess(np.abs(run.history()["dissipated_friction"]).max(), 1e-5 * stored)
+
     def settle(self):
         path = self.here("sample.h5")
         if not os.path.exists(path):

@@ -14,7 +14,7 @@ module gravier_contact_springs
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: pack_spring, conclude_springs, measure_springs, spring_energies
+  public :: pack_spring, stretch_spring, conclude_springs, measure_springs, spring_energies
 
 contains
 
@@ -29,8 +29,7 @@ contains
     !> of the contact at the start of the step (nd) [m/s]
     real(dp), intent(in) :: velocity(:)
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: w(2), law(2), kept(2)
-    integer :: d
+    real(dp) :: w(2), law(2)
 
     associate (q => lane_of(c), g => block_of(c), row => kernels%row, own => sub%spring(c), h => physics%h)
       sub%hot(q, row%compliance_n:row%compliance_t, g) = 0.0_dp
@@ -43,6 +42,22 @@ contains
       law(:) = own%law(1, h, sub%gap(c))
       sub%hot(q, row%compliance_n, g) = law(1)
       sub%hot(q, row%shift, g) = law(2)
+    end associate
+    call stretch_spring(list, kernels, physics, c, sub)
+  end subroutine pack_spring
+
+  !> Stretch the tangential spring of contact `c` by what its pair keeps: shifts and compliance along the tangents. Its velocity
+  !> and its dashpots are packed.
+  subroutine stretch_spring(list, kernels, physics, c, sub)
+    type(neighbour_list_t), intent(in) :: list
+    type(kernels_t), intent(in) :: kernels
+    type(physics_t), intent(in) :: physics
+    integer, intent(in) :: c
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: law(2), kept(2)
+    integer :: d
+
+    associate (q => lane_of(c), g => block_of(c), row => kernels%row, own => sub%spring(c), h => physics%h)
       kept(:) = kept_elongation(list, sub, c, kernels%nd)
       call own%stretches(kept, h, physics%theta, sub%gap(c))
       do d = 2, kernels%nd
@@ -51,7 +66,7 @@ contains
         sub%hot(q, row%shift_t + d - 2, g) = law(2)
       end do
     end associate
-  end subroutine pack_spring
+  end subroutine stretch_spring
 
   !> The largest deformation of compliant contacts [m], and how stiff they are for the step, h sqrt(k/m), both raised to what they
   !> are in this problem. Collective.
@@ -176,21 +191,20 @@ contains
   end function uses_its_friction
 
   !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents,
-  !> once `conclude_springs` was called. At the start elongations along the tangents are not known any more, and count as 0. The
-  !> spring of a contact that slides has the elongation that its force has all the time.
+  !> once `conclude_springs` was called. The spring of a contact that slides has the elongation that its force has all the time.
   subroutine spring_energies(problem, k, halo, physics, energies)
     type(contact_problem_t), intent(in) :: problem
     !> place of the subdomain among those of this rank
     integer, intent(in) :: k
     type(halo_t), intent(in) :: halo
     type(physics_t), intent(in) :: physics
-    !> normal at the start; normal, tangential at the end [J]
-    real(dp), intent(out) :: energies(3)
+    !> (along the normals and along the tangents; at the start and at the end) [J]
+    real(dp), intent(out) :: energies(2, 2)
     real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
     logical :: slides
     integer :: c, d
 
-    energies(:) = 0.0_dp
+    energies(:, :) = 0.0_dp
     associate (sub => problem%sub(k), nd => problem%kernels%nd, h => physics%h, theta => physics%theta)
       call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
       if (problem%cell%moves) call subtract_images(problem, k, v)
@@ -200,8 +214,10 @@ contains
           before = -(sub%gap(c) - (1.0_dp - theta)*h*own%velocity(1))
           after = -(sub%gap(c) + theta*h*v(q, 1, g))
           elongation(:) = 0.0_dp
-          energies(1) = energies(1) + own%spring%energy(before, elongation)
-          energies(2) = energies(2) + own%spring%energy(after, elongation)
+          energies(1, 1) = energies(1, 1) + own%spring%energy(before, elongation)
+          energies(1, 2) = energies(1, 2) + own%spring%energy(after, elongation)
+          elongation(:nd - 1) = own%stretch(:nd - 1) - (1.0_dp - theta)*h*own%velocity(2:nd)
+          if (before > 0.0_dp) energies(2, 1) = energies(2, 1) + own%spring%energy(0.0_dp, elongation)
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
           elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
@@ -213,7 +229,7 @@ contains
               elongation(d - 1) = elongation(d - 1) - (1.0_dp - theta)*h*v(q, d, g)
             end if
           end do
-          energies(3) = energies(3) + own%spring%energy(0.0_dp, elongation)
+          energies(2, 2) = energies(2, 2) + own%spring%energy(0.0_dp, elongation)
         end associate
       end do
     end associate

@@ -56,7 +56,7 @@ module gravier_energy_balance
     & "dissipated_normal dissipated_friction carried_away elastic elastic_start"
   !> places among the sums of a step
   integer, parameter :: in_translation = 1, in_rotation = 2, in_start = 3, in_load = 4, in_normal = 5, in_friction = 6, &
-    & in_boundary = 7, in_springs = 7, n_sums = 10
+    & in_boundary = 7, in_springs = 7, n_sums = 11
 
 contains
 
@@ -149,7 +149,7 @@ contains
     class(energy_balance_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
     type(boundary_t) :: earlier(size(step%decomposition%boundaries))
-    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums), springs(3)
+    real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums), springs(2, 2)
     integer :: s, b
 
     do b = 1, size(earlier)
@@ -166,7 +166,8 @@ contains
         & step%decomposition, s, step%physics%cell)
       if (.not. self%has_springs) cycle
       call spring_energies(step%problem, s, step%halo, step%physics, springs)
-      parts(in_springs + 1:in_springs + 3, s) = springs
+      parts(in_springs + 1:in_springs + 2, s) = springs(:, 1)
+      parts(in_springs + 3:in_springs + 4, s) = springs(:, 2)
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     if (step%others) then
@@ -182,24 +183,24 @@ contains
     self%dissipated_normal = self%dissipated_normal + sums(in_normal)
     self%dissipated_friction = self%dissipated_friction + sums(in_friction)
     self%boundary_work = self%boundary_work + sums(in_boundary)
-    if (self%has_springs) call take_springs(self, sums(in_springs + 1:in_springs + 3))
+    if (self%has_springs) call take_springs(self, sums(in_springs + 1:in_springs + 2), sums(in_springs + 3:in_springs + 4))
     call take_boundaries(self, step%decomposition%boundaries, step%boundary_impulses)
   end subroutine energy_take_step
 
   !> What the springs have stored in a step is not dissipated.
-  pure subroutine take_springs(self, energies)
+  pure subroutine take_springs(self, before, after)
     type(energy_balance_t), intent(inout) :: self
-    !> normal at the start of the step; normal, tangential at its end [J]
-    real(dp), intent(in) :: energies(3)
+    !> along the normals and along the tangents, at the start of the step and at its end [J]
+    real(dp), intent(in) :: before(2), after(2)
 
     if (.not. self%knows_springs) then
-      self%elastic(1) = energies(1)
-      self%elastic_start = energies(1)
+      self%elastic(:) = before
+      self%elastic_start = sum(before)
       self%knows_springs = .true.
     end if
-    self%dissipated_normal = self%dissipated_normal - (energies(2) - self%elastic(1))
-    self%dissipated_friction = self%dissipated_friction - (energies(3) - self%elastic(2))
-    self%elastic(:) = energies(2:3)
+    self%dissipated_normal = self%dissipated_normal - (after(1) - self%elastic(1))
+    self%dissipated_friction = self%dissipated_friction - (after(2) - self%elastic(2))
+    self%elastic(:) = after
   end subroutine take_springs
 
   !> Energies of the grains of a subdomain, and the work of the loads on them, h F . (V_i + V_{i+1})/2.

@@ -1,5 +1,6 @@
 !> The impulses that the first solve of a run starts from, where its bodies file gives forces of contacts. They enter the memory
-!> that carries impulses from step to step, so that nothing else knows where they come from.
+!> that carries impulses from step to step, so that nothing else knows where they come from. The tangential springs of contacts that
+!> yield are stretched so far that they carry the tangential forces.
 !>
 !> A given contact belongs to the contact of the first step that has the same two bodies or the same body and boundary and a normal
 !> within a right angle of its own; of several the nearest one. Rank `mod(candidate, ranks)` brings the two together: it is told of
@@ -18,6 +19,8 @@ module gravier_given_impulses
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
+  use gravier_physics, only: physics_t
+  use gravier_contact_springs, only: stretch_spring
   use gravier_contact_places, only: find_contact_place
   implicit none
   private
@@ -36,14 +39,13 @@ module gravier_given_impulses
 
 contains
 
-  !> Put impulses of given forces over a step into the memory of the pairs that touch. Collective.
-  subroutine take_given_impulses(given, decomposition, h, problem, halo, started)
+  !> Put impulses of given forces over a step into the memory of the pairs that touch, and stretch their springs. Collective.
+  subroutine take_given_impulses(given, decomposition, physics, problem, halo, started)
     type(given_contacts_t), intent(in) :: given
     type(decomposition_t), intent(in) :: decomposition
-    !> step [s]
-    real(dp), intent(in) :: h
+    type(physics_t), intent(in) :: physics
     !> of the first step
-    type(contact_problem_t), intent(in) :: problem
+    type(contact_problem_t), intent(inout) :: problem
     type(halo_t), intent(inout) :: halo
     type(started_t), intent(out) :: started
     integer(i8), allocatable :: records(:, :), pairs(:, :), mine(:, :)
@@ -54,7 +56,7 @@ contains
     call list_pairs(problem, halo, pairs)
     call bring_together(decomposition%comm, records, pairs, mine)
     allocate (pressing(size(mine, 2)))
-    call add_all(decomposition, h, problem, pairs, mine, halo, pressing)
+    call add_all(decomposition, physics, problem, pairs, mine, halo, pressing)
     started%given = given%total
     started%matched = decomposition%comm%total(count(pressing >= 0.0_dp, kind=i8))
     if (started%matched == 0) return
@@ -65,7 +67,7 @@ contains
     do k = 1, given%n
       pressing(k) = abs(sum(given%force(:, k)*given%normal(:, k)))
     end do
-    started%share = started%share/max(decomposition%comm%sum_real(pressing), tiny(h))
+    started%share = started%share/max(decomposition%comm%sum_real(pressing), tiny(physics%h))
   end subroutine take_given_impulses
 
   !> The given contacts of this rank as records: candidate, antagonist (minus the number of a boundary of the scene), 0, row,
@@ -199,10 +201,10 @@ contains
   end subroutine bring_together
 
   !> Add the forces of records to the contacts that they belong to.
-  subroutine add_all(decomposition, h, problem, pairs, records, halo, pressing)
+  subroutine add_all(decomposition, physics, problem, pairs, records, halo, pressing)
     type(decomposition_t), intent(in) :: decomposition
-    real(dp), intent(in) :: h
-    type(contact_problem_t), intent(in) :: problem
+    type(physics_t), intent(in) :: physics
+    type(contact_problem_t), intent(inout) :: problem
     !> of list_pairs; of bring_together
     integer(i8), intent(in), contiguous :: pairs(:, :), records(:, :)
     type(halo_t), intent(inout) :: halo
@@ -225,14 +227,38 @@ contains
       call find_nearest(decomposition, problem, halo, pairs, first_not_before(pairs, order, records(1:3, k)), numbers, c)
       if (c == 0) cycle
       pressing(k) = abs(sum(numbers(1:3)*numbers(4:6)))
-      numbers(4:6) = h*numbers(4:6)
-      numbers(10:12) = h*numbers(10:12)
+      if (problem%sub(s)%yields(c)) call elongate(problem%sub(s), c, numbers(1:6), halo%view(s)%list)
+      numbers(4:6) = physics%h*numbers(4:6)
+      numbers(10:12) = physics%h*numbers(10:12)
       call add_impulse(problem%kernels, problem%sub(s), c, numbers, halo%view(s)%list)
     end do
     do s = 1, size(problem%sub)
       call settle(problem%sub(s), halo%view(s)%list)
+      do c = 1, problem%sub(s)%n_contacts
+        if (problem%sub(s)%yields(c)) call stretch_spring(halo%view(s)%list, problem%kernels, physics, c, problem%sub(s))
+      end do
     end do
   end subroutine add_all
+
+  !> Stretch the tangential spring of a contact, as its pair keeps it, by a force over the stiffness. If the normal spring presses
+  !> less than the force needs, the contact slides in the step, which brings the spring back to the bound of friction.
+  pure subroutine elongate(sub, c, numbers, list)
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    !> normal and force of a record [N]
+    real(dp), intent(in) :: numbers(6)
+    type(neighbour_list_t), intent(inout) :: list
+
+    associate (normal => numbers(1:3), force => numbers(4:6), stiffness => sub%spring(c)%spring%stiffness(2), &
+      & kept => list%spring(:, sub%source(c)))
+      if (.not. stiffness > 0.0_dp) return
+      if (size(kept) == 1) then
+        kept(1) = kept(1) - (normal(1)*force(2) - normal(2)*force(1))/stiffness
+      else
+        kept(:) = kept - (force - sum(force*normal)*normal)/stiffness
+      end if
+    end associate
+  end subroutine elongate
 
   !> Of the contacts of a pair, the nearest one to a place whose normal is within a right angle of that given; 0 for none.
   subroutine find_nearest(decomposition, problem, halo, pairs, first, numbers, nearest)

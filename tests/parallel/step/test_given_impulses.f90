@@ -192,7 +192,8 @@ contains
     call check(listed%total > 50, "enough of them to tell")
     call shuffle(listed, shuffled)
     call forget(sim)
-    call take_given_impulses(shuffled, sim%decomposition, 0.5_dp, sim%problem, sim%halo, started)
+    sim%physics%h = 0.5_dp
+    call take_given_impulses(shuffled, sim%decomposition, sim%physics, sim%problem, sim%halo, started)
     call recall_impulses(sim%halo, sim%problem)
     call check_equal(started%given, listed%total, "contacts given")
     call check_equal(started%matched, listed%total, "contacts matched")
@@ -240,7 +241,8 @@ contains
     end do
     listed%boundary(1) = "elsewhere"
     call forget(sim)
-    call take_given_impulses(listed, sim%decomposition, 0.5_dp, sim%problem, sim%halo, started)
+    sim%physics%h = 0.5_dp
+    call take_given_impulses(listed, sim%decomposition, sim%physics, sim%problem, sim%halo, started)
     call check(comm%total(lost) > 10, "enough contacts that match nothing")
     call check_equal(started%matched, listed%total - comm%total(lost), "contacts matched, of "//to_text(listed%total))
     call check(started%share < 0.95_dp, "share of the normal forces")
