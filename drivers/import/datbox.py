@@ -147,6 +147,8 @@ def read_initial(path, bodies):
                 entry.refuse(f"body {' '.join(entry.words[:2])}", f"a body of BODIES.DAT, {bodies[0].kind} 1 to {len(bodies)}")
             body = bodies[rank - 1]
         elif keyword == "$nodty" and entry.words and body:
+            if body.initial:
+                entry.refuse(f"a second state of body {body.rank}, after that of line {body.initial.line}", "one state of a body")
             body.initial = entry
     return time
 

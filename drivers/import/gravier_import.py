@@ -92,6 +92,9 @@ def read(options):
         raise Refused(f"--period {' '.join(f'{length:g}' for length in options.period)}: expected finite numbers >= 0")
     case = Case(bodies, density, gravity, laws, sees, options)
     case.build()
+    known = sum(body.initial is not None for body in bodies)
+    if 0 < known < len(bodies):
+        case.remarks.append(f"{places.name} has {known} of the {len(bodies)} bodies: the others are at rest where BODIES.DAT has them")
     if abs(time - start) > SAME_TIME * max(abs(time), abs(start)):
         case.remarks.append(f"{forces.name} is of {time:g} s and {places.name} of {start:g} s: the first solve does not start from its forces")
     else:

@@ -115,7 +115,11 @@ class Case:
         """A driven body of disks or spheres, or of polygons or polyhedra: grains glued to each other, each of its own material, or one grain
         with a shape."""
         seen = [self.laws.meet(self.laws.thing(contactor)) for contactor in body.contactors]
+        keys, columns = motion(self, body, True)
         if not any(seen):
+            if "free" in keys:
+                body.start.refuse(f"body {body.rank} ({body.contactors[0].words[0]}) is moved by forces and no body without drives sees it",
+                                  f"vlocy 1 to {len(keys['free'])} in DRV_DOF.DAT, or no drives: boundaries pass through each other here")
             self.remarks.append(f"body {body.rank} {body.contactors[0].words[0]}: no grain sees it, left out")
             return
         group = self.new_group()
@@ -125,10 +129,24 @@ class Case:
             for contactor, there in zip(body.contactors, seen):
                 if there:
                     self.add_grain(body, contactor, axes_of(body, contactor)[0], group)
-        keys, columns = motion(self, body, True)
         self.boundaries.append(({"name": f"body {body.rank}", "shape": "grains", "group": group, **keys}, columns))
 
+    def check_moved_by_forces(self):
+        """Refuse bodies that forces move, and that see others with drives: they become boundaries, which do not meet each other."""
+        driven = [body for body in self.bodies if body not in self.free]
+        for body in driven:
+            still = all(body.drives.get(k, ("force",))[0] == "vlocy" for k in range(1, self.dimension + 1))
+            others = () if still else (other for other in driven if other is not body)
+            for other in others:
+                pairs = [{self.laws.thing(one), self.laws.thing(two)} for one in body.contactors for two in other.contactors]
+                for pair, _, _, see in self.laws.sees:
+                    if set(pair) in pairs:
+                        see.refuse(f"body {body.rank} ({body.contactors[0].words[0]}), which forces move, sees body {other.rank} "
+                                   f"({other.contactors[0].words[0]}), which has drives too",
+                                   f"vlocy 1 to {self.dimension} of body {body.rank}, no drives of it, or no such line: boundaries pass through each other here")
+
     def build(self):
+        self.check_moved_by_forces()
         for thing in sorted(self.laws.colours):
             self.laws.meet(thing)
         for body in self.bodies:

@@ -39,10 +39,11 @@ def motion(case, body, whole):
             columns["f" + name[1]] = Function(table=function.table + [0.0, weight])
     spin = np.array(velocity[d:])
     if d == 3:
-        turned = not np.allclose(body.frame(), np.eye(3))
-        if turned and any(name in columns for name in names[3:]):
+        # axes of inertia: those of DOF.INI or, without it, those that BODIES.DAT gives the contactor of a body with one
+        frame = axes_of(body, body.contactors[0])[1] if body.initial is None and len(body.contactors) == 1 else body.frame()
+        if not np.allclose(frame, np.eye(3)) and any(name in columns for name in names[3:]):
             body.start.refuse(f"body {body.rank} turns at a changing rate about axes that are not those of space", "a constant rate")
-        spin = body.frame() @ spin
+        spin = frame @ spin
     if any(velocity[:d]):
         keys["velocity"] = velocity[:d]
     if np.any(spin != 0.0):

@@ -634,6 +634,50 @@ class Import(RunTestCase):
         _, message = self.convert(self.box(2, glued, LAW + self.see("iqsc0"), still(2, 2)))
         self.assertIn("body 2 DISKx: no grain sees it, left out", message)
 
+    def test_what_would_fall_through_is_refused(self):
+        """Bodies that forces move become boundaries, which pass through each other: refused where LMGC90 has them meet another driven body, and
+        where no body without drives sees them."""
+        ball = [("DISKx", "BLUEx", values(byrd=0.05))]
+        ground = [("JONCx", "WALLx", values(axe1=1.0, axe2=0.01))]
+        bodies = body(2, 1, [0.0, 0.05], ball) + body(2, 2, [0.5, 0.05], ball) + body(2, 3, [0.0, -0.01], ground)
+        on_ground = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        each_other = SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx")
+        pulled = drive(2, 1, [("force", 1, 20.0, 0.0, 0.0, 0.0, 1.0, 0.0), ("vlocy", 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)])
+        turns = drive(2, 1, [("force", 1, 20.0, 0.0, 0.0, 0.0, 1.0, 0.0)])
+        for drives, laws, words in (
+                (pulled, on_ground, "TACT_BEHAV.DAT: line 5: body 1 (DISKx), which forces move, sees body 3 (JONCx), which has drives too: expected vlocy 1 to 2 of body 1"),
+                (turns, LAW + each_other, "body 1 (DISKx) turns freely: expected vlocy 3"),
+                (pulled, LAW + SEE.format("RBDY2", "DISKx", "REDxx", "JONCx", "WALLx"), "body 1 (DISKx) is moved by forces and no body without drives sees it: expected vlocy 1 to 2")):
+            with self.subTest(words=words):
+                folder, message = self.convert(self.box(2, bodies, laws, still(2, 3) + drives), status=2)
+                self.assertIn(words, message)
+                self.assertEqual(os.listdir(folder), [])
+        # a lid that meets grains alone is one as ever
+        self.convert(self.box(2, bodies, LAW + each_other, still(2, 3) + pulled))
+
+    def test_states_that_are_not_those_of_the_bodies(self):
+        """A file of states that lacks bodies is told of, and one that has a body twice is refused."""
+        bodies = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.5, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx")
+        one = state(2, 1, [0.1, 0.0], [0.0, 0.0])
+        _, notes = self.convert(self.box(2, bodies, laws, "", one))
+        self.assertIn("note: DOF.INI has 1 of the 2 bodies: the others are at rest where BODIES.DAT has them\n", notes)
+        _, notes = self.convert(self.box(2, bodies, laws, "", one + state(2, 2, [0.0, 0.0], [0.0, 0.0])))
+        self.assertNotIn("of the 2 bodies", notes)
+        _, message = self.convert(self.box(2, bodies, laws, "", one + state(2, 1, [0.2, 0.0], [0.0, 0.0])), status=2)
+        self.assertRegex(message, r"DOF\.INI: line \d+: a second state of body 1, after that of line \d+: expected one state of a body")
+
+    def test_a_plate_that_turns_in_its_frame(self):
+        """A plate whose frame stands in BODIES.DAT turns about its own axes, as LMGC90 has it without DOF.INI."""
+        frame = "".join("\n" + " " * 29 + vectors(name, axis) for name, axis in (("alp", [1.0, 0.0, 0.0]), ("bet", [0.0, 0.0, -1.0]), ("gam", [0.0, 1.0, 0.0])))
+        bodies = body(3, 1, [0.0, 0.06, 0.0], [("SPHER", "BLUEx", values(byrd=0.05))]) + \
+            body(3, 2, [0.0] * 3, [("PLANx", "WALLx", values(axe1=1.0, axe2=1.0, axe3=0.01) + "\n" + " " * 29 + "localframe" + frame)])
+        laws = LAW + SEE.format("RBDY3", "SPHER", "BLUEx", "SPHER", "BLUEx") + SEE.format("RBDY3", "SPHER", "BLUEx", "PLANx", "WALLx")
+        turning = drive(3, 2, [("vlocy", k, 1.0 if k == 6 else 0.0, 0.0, 0.0, 0.0, 1.0, 0.0) for k in range(1, 7)])
+        folder, _ = self.convert(self.box(3, bodies, laws, turning))
+        with open(os.path.join(folder, "case.nml"), encoding="utf-8") as file:
+            self.assertRegex(file.read(), r"rotation = -?0\.0, 1\.0, -?0\.0")
+
     def test_a_wall_through_the_middle_of_a_grain(self):
         """A wall on whose middle all grains lie has both of its sides."""
         for dimension, shape, wall, half in ((2, "DISKx", "JONCx", {"axe1": 0.5, "axe2": 0.01}),

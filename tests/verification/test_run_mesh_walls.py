@@ -266,6 +266,29 @@ class MeshWalls(RunTestCase):
             history = gravier.Run(plane.directory).history()
             self.assertLess(abs(history["kinetic_energy"][-1] / history["kinetic_energy"][0] - 1), 2e-3)
 
+    def test_a_side_over_a_flat_ridge(self):
+        """A box on a roof so flat that springs press both of its slopes has points on both, whichever facets come first: it stands still, its
+        lower ends bear the same on both sides, and a mirror gives the mirror image."""
+        library = "shape box\nrounding 0.002\nbox 0.2 0.1 0.05\n"
+        law = {"materials": "m", "kind": "elastic", "normal_stiffness": 1e4, "friction": 0.5, "spring_restitution": 0.3}
+        for slope in (1e-4, 1e-3):
+            a, b = (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)
+            left = [((-1.0, -1.0, -slope), a, b), ((-1.0, -1.0, -slope), b, (-1.0, 1.0, -slope))]
+            right = [(a, (1.0, -1.0, -slope), (1.0, 1.0, -slope)), (a, (1.0, 1.0, -slope), b)]
+            found = []
+            for title, facets in (("left first", left + right), ("right first", right + left)):
+                motion = self.play(f"ridge {slope} {title}", 3, [body("box", [0.0, 0.0, 0.0251], [1.0, 0.0, 0.0, 0.0])], [{**MESH, "material": "m"}],
+                                   {"scene": {"friction": None}, "material": [{"name": "m", "density": 1000.0}], "law": [law],
+                                    "time": {"step": 1e-3, "steps": 1000}, "output": {"every": 100}}, mesh=np.array(facets), library=library)
+                found.append(motion)
+                self.assertLess(np.abs(motion.velocity[-1]).max(), 1e-9, title)
+                self.assertEqual(len(motion.contacts()), 6, title)
+                place, force = motion.found["/steps/1000/contacts/point"], motion.contacts()[:, 0] / 1e-3
+                self.assertAlmostEqual(force.sum(), 9.81, delta=1e-6)
+                ends = [force[side * place[:, 0] > 0.05].sum() for side in (1, -1)]
+                self.assertAlmostEqual(ends[0], ends[1], delta=1e-6 * force.sum())
+            np.testing.assert_allclose(found[0].position[-1], found[1].position[-1], atol=1e-12)
+
     def test_rims(self):
         """Boxes that fall half over the straight rim of a mesh move as over that of a rectangle, whatever corners the rim has and however the mesh
         is cut, rigid and on springs, also where they are deeper than their roundings."""

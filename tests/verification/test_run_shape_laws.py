@@ -311,6 +311,30 @@ class ShapeLaws(RunTestCase):
                         else:
                             self.assertGreater(fall, 2e-5)
 
+    def test_tiles_that_hang(self):
+        """A tile thinner than the range of what holds it hangs on the four corners of its side, four times as strong as one: under a plane, a
+        rectangle and in a cylinder, whose far corners are within the range too."""
+        library = "shape tile\nrounding 0.0002\nbox 0.1 0.1 0.002\n"
+        mass = 1000.0 * 0.1 * 0.1 * 0.002
+        walls = {"plane": {"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0]},
+                 "rectangle": {"shape": "rectangle", "point": [-1.0, -1.0, 0.0], "edge_a": [2.0, 0.0, 0.0], "edge_b": [0.0, 2.0, 0.0]},
+                 "cylinder": {"shape": "cylinder", "point": [0.0, 0.0, 50.0], "axis": [0.0, 1.0, 0.0], "radius": 50.0}}
+        laws = {"bonded": {"bond_strength": 1.0, "bond_distance": 3e-3, "bond_friction": 1.0}, "adhesive": {"adhesion": 1.0, "adhesion_range": 3e-3}}
+        for name, wall in walls.items():
+            for kind, keys in laws.items():
+                for pull in (3.9, 4.1):
+                    with self.subTest(wall=name, kind=kind, pull=pull):
+                        directory = prepare(self.here(f"tile {name} {kind} {pull}"), 3, [body("tile", [0.0, 0.0, 0.001], STILL[3])], library)
+                        run = run_case(shaped_case(3, [{**wall, "material": "m"}], {
+                            "scene": {"gravity": [0.0, 0.0, pull / mass]}, "material": [{"name": "m", "density": 1000.0}],
+                            "law": [{"materials": "m", "kind": kind, **keys}], "solver": {"accuracy": 1e-5},
+                            "time": {"step": 1e-4, "steps": 20}, "output": {"every": 1}}), 1, directory)
+                        self.assert_status(run, 0)
+                        self.assertEqual(len(run.results()["/steps/1/contacts/impulse"]), 4)
+                        speed = np.abs(self.track(run, "velocity")[-1]).max()
+                        # what is not borne, 0.1 N of 4.1 at the start, moves it by 0.5 m/s2, faster with each bond that breaks
+                        self.assertEqual(speed > 5e-4, pull > 4.0, speed)
+
     def test_strength_of_a_joint_that_turns(self):
         """The same cube at the height of the pivot about which the wall turns, but 1 m away: it pulls with its weight at the spin sqrt(g / 1 m)."""
         rate, steps = np.sqrt(G), 200

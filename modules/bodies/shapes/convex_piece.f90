@@ -9,7 +9,7 @@ module gravier_convex_piece
   implicit none
   private
   public :: convex_piece_t
-  public :: find_support, find_candidates, list_faces, number_of_sectors, shares_corner, first_of_corner
+  public :: find_support, find_candidates, list_faces, number_of_sectors, shares_corner, looks_along, first_of_corner
 
   type :: convex_piece_t
     !> the rounding, above 0
@@ -47,6 +47,23 @@ module gravier_convex_piece
   real(dp), parameter :: ahead = 1.0e-9_dp
 
 contains
+
+  !> Whether a vertex may be the next to meet a plane: a face at it looks at the plane within 60 degrees. Others are on the far
+  !> side, however near they are, as the upper corners of a tile that lies there. A core without faces has no far side.
+  pure logical function looks_along(piece, v, along) result(looks)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: v
+    !> unit vector towards the plane, in the axes of the piece
+    real(dp), intent(in) :: along(3)
+    integer :: k
+
+    looks = size(piece%face_normal, 2) == 0
+    if (looks) return
+    do k = piece%vertex_face_first(v), piece%vertex_face_first(v + 1) - 1
+      looks = dot_product(piece%face_normal(:, piece%vertex_face(k)), along) >= 0.5_dp
+      if (looks) return
+    end do
+  end function looks_along
 
   !> Whether the same sharp corner is behind two vertices.
   pure logical function shares_corner(piece, v, w) result(shares)

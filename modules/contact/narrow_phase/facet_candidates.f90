@@ -34,6 +34,8 @@ module gravier_facet_candidates
     real(dp) :: normal(3) = 0.0_dp, foot(3) = 0.0_dp
     !> it is no place of contact, or one that was seen to
     logical :: dropped = .false.
+    !> place of a facet whose plane has the point of this candidate and is the first to touch there; 0 for none
+    integer :: beside = 0
   end type facet_candidate_t
 
   !> Candidates, the nearest first once they are sorted.

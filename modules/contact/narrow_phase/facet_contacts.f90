@@ -278,7 +278,8 @@ contains
             end associate
             call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
           end if
-          call found%add(near%number(item%place), manifold)
+          if (item%beside > 0) call leave_plane(near, item%beside, radius*piece%rounding, manifold)
+          if (manifold%n > 0) call found%add(near%number(item%place), manifold)
         end associate
       end do
     end do
@@ -357,8 +358,9 @@ contains
     end do
   end function is_stopped
 
-  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side,
-  !> and nor have others at points of theirs.
+  !> The facets that lie in the plane of that of a candidate, which comes first. They have no contacts of their own on this side.
+  !> Others have none at points of these facets, but may have some away from there, where a side of the piece lies over a ridge so
+  !> flat that it is near to both of its slopes.
   pure subroutine take_plane(near, first, rounding, found, n, corner)
     type(near_facets_t), intent(in) :: near
     !> place of the candidate in the order
@@ -369,21 +371,14 @@ contains
     integer, intent(out) :: n
     !> the first n [m]
     real(dp), intent(out), contiguous :: corner(:, :, :)
-    real(dp) :: normal(3), height, room
     logical :: is_in_plane(near%n)
-    integer :: k, c, lead
+    integer :: k, lead
 
     lead = found%candidates%item(found%candidates%order(first))%place
-    call find_facet_normal(near%corner(:, :, lead), normal)
-    room = min(over_tolerance*near%tolerance, in_plane*rounding)
+    is_in_plane(:) = lies_in_plane(near, lead, rounding)
     n = 1
     corner(:, :, 1) = near%corner(:, :, lead)
     do k = 1, near%n
-      is_in_plane(k) = .true.
-      do c = 1, 3
-        height = dot_product(normal, near%corner(:, c, k) - near%corner(:, 1, lead))
-        is_in_plane(k) = is_in_plane(k) .and. abs(height) <= room
-      end do
       if (k == lead .or. .not. is_in_plane(k)) cycle
       n = n + 1
       corner(:, :, n) = near%corner(:, :, k)
@@ -393,13 +388,77 @@ contains
         associate (item => found%candidates%item(k))
           if (item%dropped .or. item%place == lead .or. dot_product(item%normal, chosen%normal) <= one_side) cycle
           item%dropped = is_in_plane(item%place)
-          do c = 1, n
-            if (item%dropped) exit
-            item%dropped = has_point(corner(:, :, c), item%foot, tolerance_for(near, rounding))
-          end do
+          if (item%dropped .or. item%beside > 0) cycle
+          if (is_on_one(corner(:, :, 1:n), item%foot, tolerance_for(near, rounding))) item%beside = lead
         end associate
       end do
     end associate
   end subroutine take_plane
+
+  !> Which facets lie in the plane of one.
+  pure function lies_in_plane(near, lead, rounding) result(lies)
+    type(near_facets_t), intent(in) :: near
+    !> place of the one
+    integer, intent(in) :: lead
+    !> of the piece [m]
+    real(dp), intent(in) :: rounding
+    logical :: lies(near%n)
+    real(dp) :: normal(3), height, room
+    integer :: k, c
+
+    call find_facet_normal(near%corner(:, :, lead), normal)
+    room = min(over_tolerance*near%tolerance, in_plane*rounding)
+    do k = 1, near%n
+      lies(k) = .true.
+      do c = 1, 3
+        height = dot_product(normal, near%corner(:, c, k) - near%corner(:, 1, lead))
+        lies(k) = lies(k) .and. abs(height) <= room
+      end do
+    end do
+  end function lies_in_plane
+
+  !> Whether one of some facets has a point.
+  pure logical function is_on_one(corner, point, tolerance) result(is_on)
+    !> (3, 3, facets) [m]
+    real(dp), intent(in), contiguous :: corner(:, :, :)
+    real(dp), intent(in) :: point(3), tolerance
+    integer :: k
+
+    is_on = .false.
+    do k = 1, size(corner, 3)
+      is_on = has_point(corner(:, :, k), point, tolerance)
+      if (is_on) return
+    end do
+  end function is_on_one
+
+  !> Leave out the points of a manifold that lie on the facets of a plane, which has them.
+  pure subroutine leave_plane(near, lead, rounding, manifold)
+    type(near_facets_t), intent(in) :: near
+    !> place of one of the facets of the plane
+    integer, intent(in) :: lead
+    !> of the piece [m]
+    real(dp), intent(in) :: rounding
+    type(manifold_t), intent(inout) :: manifold
+    logical :: is_in_plane(near%n), is_taken
+    real(dp) :: foot(3)
+    integer :: c, k, n
+
+    is_in_plane(:) = lies_in_plane(near, lead, rounding)
+    n = 0
+    do c = 1, manifold%n
+      call find_foot_of(manifold, c, foot)
+      is_taken = .false.
+      do k = 1, near%n
+        if (is_taken) exit
+        if (is_in_plane(k)) is_taken = has_point(near%corner(:, :, k), foot, tolerance_for(near, rounding))
+      end do
+      if (is_taken) cycle
+      n = n + 1
+      manifold%point(:, n) = manifold%point(:, c)
+      manifold%gap(n) = manifold%gap(c)
+      manifold%key(n) = manifold%key(c)
+    end do
+    manifold%n = n
+  end subroutine leave_plane
 
 end module gravier_facet_contacts

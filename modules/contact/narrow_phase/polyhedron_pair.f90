@@ -5,7 +5,7 @@
 !> Neither face is the reference, so that nothing changes where parallel faces swap their roles. Other pieces touch in one point.
 module gravier_polyhedron_pair
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, find_support, first_of_corner
+  use gravier_convex_piece, only: convex_piece_t, find_support, looks_along, first_of_corner
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
   use gravier_core_overlap, only: find_least_separation
   use gravier_contact_feature, only: placement_t, feature_t, frame_t, find_feature, lay_out_feature, edge_number, face_number, &
@@ -157,7 +157,8 @@ contains
   end subroutine find_tangents
 
   !> The contacts of a piece and a half-space, in the axes of the piece: blended corners of the face or edge that lies along the
-  !> plane, and all other corners that are near enough, each with its lowest vertex. Keys are those of the piece's vertices.
+  !> plane, and all other corners of this side that are near enough, each with its lowest vertex. Keys are those of the piece's
+  !> vertices.
   pure subroutine find_halfspace_manifold(a, radius, normal, distance, alert, most, manifold)
     type(convex_piece_t), intent(in) :: a
     !> what the lengths of the piece are multiplied by [m]
@@ -201,6 +202,7 @@ contains
       ! most vertices are far from the plane
       if (.not. corner(3) + distance - radius*a%rounding < alert) cycle
       if (any(vertex(1:m) == k)) cycle
+      if (k /= lowest(1) .and. .not. looks_along(a, k, along)) cycle
       corner(1) = dot_product(x, frame%first)
       corner(2) = dot_product(x, frame%second)
       call add_point(point_of(k, corner), alert, radius, n, point)

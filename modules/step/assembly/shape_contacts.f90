@@ -1,7 +1,7 @@
 !> The points in which two bodies touch, or a body and a boundary, where bodies have shapes.
 module gravier_shape_contacts
   use gravier_kinds, only: dp
-  use gravier_convex_piece, only: convex_piece_t, list_faces, shares_corner, first_of_corner
+  use gravier_convex_piece, only: convex_piece_t, list_faces, shares_corner, looks_along, first_of_corner
   use gravier_shape_library, only: shape_library_t, face_points
   use gravier_boundary, only: boundary_t
   use gravier_manifold, only: manifold_t, feature_base
@@ -343,8 +343,8 @@ contains
     integer, intent(in) :: number
     type(pair_points_t), intent(inout) :: points
     type(manifold_t) :: manifold
-    real(dp) :: gap(size(piece%vertex, 2)), normal(size(centre)), vertex(3)
-    integer :: v, nd, nearest, beside
+    real(dp) :: gap(size(piece%vertex, 2)), normal(size(centre)), vertex(3), along(3)
+    integer :: v, k, nd, nearest, beside
 
     nd = size(centre)
     do v = 1, size(gap)
@@ -361,6 +361,12 @@ contains
       if (gap(v) > alert .or. (nd == 2 .and. v /= nearest .and. v /= beside)) cycle
       if (.not. is_nearest_of_corner(v)) cycle
       call locate_vertex()
+      if (nd == 3 .and. v /= nearest) then
+        do k = 1, 3
+          along(k) = -dot_product(normal, a%axes(:, k))
+        end do
+        if (.not. looks_along(piece, v, along)) cycle
+      end if
       manifold%n = 1
       manifold%normal(1:nd) = normal
       manifold%gap(1) = gap(v)
