@@ -9,7 +9,7 @@ module gravier_convex_piece
   implicit none
   private
   public :: convex_piece_t
-  public :: find_support, find_candidates, list_faces, number_of_sectors, shares_corner, looks_along, first_of_corner
+  public :: find_support, find_candidates, list_faces, bound_piece, number_of_sectors, shares_corner, looks_along, first_of_corner
 
   type :: convex_piece_t
     !> the rounding, above 0
@@ -30,6 +30,9 @@ module gravier_convex_piece
     !> in 3D, the faces that have each vertex as a corner: vertex_face(vertex_face_first(v):vertex_face_first(v + 1) - 1) of vertex
     !> v, in ascending order (n + 1)
     integer, allocatable :: vertex_face_first(:), vertex_face(:)
+    !> centre and radius of a ball that holds the piece with its rounding (nd)
+    real(dp), allocatable :: middle(:)
+    real(dp) :: reach = 0.0_dp
     !> corners of the largest face, at least 2
     integer :: largest_face = 2
     !> in 3D, for a core of some vertices, those that can be the farthest along a direction of a sector, in ascending order:
@@ -244,5 +247,21 @@ contains
       end do
     end do
   end subroutine list_faces
+
+  !> Find a ball that holds a piece: about the middle of the box of its vertices.
+  pure subroutine bound_piece(piece)
+    type(convex_piece_t), intent(inout) :: piece
+    integer :: v, d
+
+    if (.not. allocated(piece%middle)) allocate (piece%middle(size(piece%vertex, 1)))
+    do d = 1, size(piece%middle)
+      piece%middle(d) = 0.5_dp*(minval(piece%vertex(d, :)) + maxval(piece%vertex(d, :)))
+    end do
+    piece%reach = 0.0_dp
+    do v = 1, size(piece%vertex, 2)
+      piece%reach = max(piece%reach, norm2(piece%vertex(:, v) - piece%middle))
+    end do
+    piece%reach = piece%reach + piece%rounding
+  end subroutine bound_piece
 
 end module gravier_convex_piece

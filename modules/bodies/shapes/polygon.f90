@@ -3,7 +3,7 @@
 module gravier_polygon
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, bound_piece
   use gravier_shape_library, only: body_shape_t
   implicit none
   private
@@ -122,6 +122,7 @@ contains
       shape%piece(k)%vertex(:, :) = shape%piece(k)%vertex/size_of
       shape%piece(k)%corner(:, :) = shape%piece(k)%corner/size_of
       shape%piece(k)%rounding = shape%piece(k)%rounding/size_of
+      call bound_piece(shape%piece(k))
     end do
   end subroutine make_flat_shape
 

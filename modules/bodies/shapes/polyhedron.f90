@@ -7,7 +7,7 @@ module gravier_polyhedron
   use gravier_text, only: to_text
   use gravier_convex_hull, only: find_hull
   use gravier_closed_surface, only: merge_points, check_closed_convex
-  use gravier_convex_piece, only: convex_piece_t, find_candidates, list_faces
+  use gravier_convex_piece, only: convex_piece_t, find_candidates, list_faces, bound_piece
   use gravier_mass_properties, only: mass_t, mass_of_polyhedron, mass_of_capsule, find_principal_axes
   use gravier_rounded_core, only: find_core
   use gravier_shape_library, only: body_shape_t
@@ -167,6 +167,7 @@ contains
       shape%piece(k)%corner(:, :) = shape%piece(k)%corner/shape%size
       call find_candidates(shape%piece(k))
       call list_faces(shape%piece(k))
+      call bound_piece(shape%piece(k))
     end do
     shape%volume = mass%volume/shape%size**3
     shape%inertia(:) = moment/mass%volume/shape%size**2

@@ -33,6 +33,8 @@ module gravier_shape_contacts
   !> Where contacts attract or yield, corners of a patch that are this near to the line of their neighbours, over the radius, are
   !> left out. Two faces that have shifted a little then have as many attractions or springs as before.
   real(dp), parameter :: straight_joint = 3.0e-3_dp
+  !> 1 and some roundings: pieces whose balls are farther apart have no contact
+  real(dp), parameter :: apart = 1.0_dp + 1.0e-9_dp
 
   !> What is made once for many pairs: a disk or a sphere of radius 1 as a piece, room for pieces where bodies are and where they
   !> go, and for facets.
@@ -117,9 +119,11 @@ contains
     type(seen_body_t), intent(in) :: a, b
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
+    logical :: several
     integer :: k, number(2)
 
     number(:) = 1
+    several = n_pieces(shapes, a)*n_pieces(shapes, b) > 1 .and. a%shape > 0
     if (a%shape == 0) then
       call touch(work%ball)
     else
@@ -140,10 +144,26 @@ contains
       else
         do l = 1, size(shapes%shape(b%shape)%piece)
           number(2) = l
-          call touch_piece(piece, shapes%shape(b%shape)%piece(l), a, b, number, work, points)
+          associate (other => shapes%shape(b%shape)%piece(l))
+            ! bodies of one piece each are near to each other by their own balls
+            if (several) then
+              if (are_apart(piece, other)) cycle
+            end if
+            call touch_piece(piece, other, a, b, number, work, points)
+          end associate
         end do
       end if
     end subroutine touch
+
+    !> Whether the balls that hold two pieces are farther apart than contacts are wide.
+    pure logical function are_apart(one, other)
+      type(convex_piece_t), intent(in) :: one, other
+      real(dp) :: at_one(3), at_other(3)
+
+      call turn_vertex(one%middle, a, at_one)
+      call turn_vertex(other%middle, b, at_other)
+      are_apart = norm2(b%centre + at_other - a%centre - at_one) > apart*(a%radius*one%reach + b%radius*other%reach + work%alert)
+    end function are_apart
 
   end subroutine touch_body
 

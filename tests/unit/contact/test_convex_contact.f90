@@ -5,7 +5,7 @@ program test_convex_contact
     & ieee_set_halting_mode, ieee_value
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_convex_piece, only: convex_piece_t, find_support, number_of_sectors
+  use gravier_convex_piece, only: convex_piece_t, find_support, looks_along, number_of_sectors
   use gravier_nearest_simplex, only: find_nearest
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance, support_a, support_b, &
     & place_a, place_b
@@ -28,6 +28,8 @@ program test_convex_contact
   call test_simplices()
   call test_random_simplices()
   call test_support()
+  call test_bounds()
+  call test_far_side()
   call test_candidates()
   call test_distance()
   call test_turned_distance()
@@ -41,6 +43,48 @@ program test_convex_contact
   call finish_checks()
 
 contains
+
+  !> The ball that holds a piece holds all of its core with the rounding, and touches it.
+  subroutine test_bounds()
+    call test_bound(box%piece(1))
+    call test_bound(rod%piece(1))
+    call test_bound(ball%piece(1))
+    ! the radius of a body is that of a ball that holds its sharp corners
+    call check(box%piece(1)%reach < 1.0_dp .and. box%piece(1)%reach > 0.9_dp, "that of a box is within the ball of the body")
+  end subroutine test_bounds
+
+  subroutine test_bound(piece)
+    type(convex_piece_t), intent(in) :: piece
+    real(dp) :: farthest
+    integer :: v
+
+    farthest = 0.0_dp
+    do v = 1, size(piece%vertex, 2)
+      farthest = max(farthest, norm2(piece%vertex(:, v) - piece%middle) + piece%rounding)
+    end do
+    call check_close(farthest, piece%reach, tight, "the ball that holds a piece")
+  end subroutine test_bound
+
+  !> Of a box the four corners of the side that looks at a plane are of this side, also where it leans by 20 degrees; all of a rod
+  !> are.
+  subroutine test_far_side()
+    real(dp) :: along(3)
+    integer :: v, n
+
+    do n = 0, 1
+      along(1) = sin(n*pi/9)
+      along(2) = 0.0_dp
+      along(3) = -cos(n*pi/9)
+      associate (piece => box%piece(1))
+        do v = 1, size(piece%vertex, 2)
+          call check(looks_along(piece, v, along) .eqv. piece%vertex(3, v) < 0.0_dp, "the side of a corner of a box")
+        end do
+      end associate
+    end do
+    do v = 1, size(rod%piece(1)%vertex, 2)
+      call check(looks_along(rod%piece(1), v, along), "a rod has no far side")
+    end do
+  end subroutine test_far_side
 
   !> Simplices whose nearest points are known.
   subroutine test_simplices()
