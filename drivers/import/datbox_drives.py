@@ -1,5 +1,6 @@
 """What drives bodies of a DATBOX: DRV_DOF.DAT."""
 import math
+import re
 
 import numpy as np
 from datbox_text import Refused, entries
@@ -21,7 +22,9 @@ class Function:
         if "evolution" in entry.words:
             path = entry.path.parent / entry.words[entry.words.index("evolution") + 1]
             try:
-                table = np.loadtxt(path, ndmin=2)
+                # exponents as Fortran writes them
+                text = re.sub(r"(?<=[0-9.])[dD](?=[-+0-9])", "e", path.read_text(encoding="latin-1"))
+                table = np.loadtxt(text.splitlines(), ndmin=2) if text.strip() else np.empty((0, 0))
             except (OSError, ValueError) as problem:
                 raise Refused(f"{entry.path}: line {entry.line}: {path}: {problem}: expected a file of times and values") from None
             if table.shape[1] < 2 or not np.all(np.isfinite(table[:, :2])) or np.any(np.diff(table[:, 0]) <= 0.0):

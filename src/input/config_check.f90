@@ -371,6 +371,8 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     call expect(report, config%output%directory /= "", "output", "directory", error)
+    call expect(report, config%output%directory(1:1) /= "~", "output", "directory", error, &
+                "a path without ~, which a shell replaces and this program does not")
     call expect(report, config%output%every >= 0, "output", "every", error)
     call expect(report, config%output%checkpoint_every >= 0, "output", "checkpoint_every", error)
     call expect(report, config%output%fclib_step >= 0, "output", "fclib_step", error)

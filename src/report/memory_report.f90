@@ -27,10 +27,9 @@ module gravier_memory_report
     real(dp) :: peak = 0.0_dp
   end type memory_report_t
 
-  !> copies of the words of a row while it is written: as they are collected, as a record, and sorted or as they are written; on
-  !> several ranks as they are collected, sorted, sent and received. Rows of grains are down to two when those of contacts are at
-  !> their most
-  integer, parameter :: copies(2) = [3, 4], grain_copies = 2
+  !> a table that is written is in memory once, and its widest column this often besides: as records, and on several ranks as what
+  !> is sent or received; to find the order of its rows takes so many words of a row
+  integer, parameter :: column_copies(2) = [1, 2], ordering_words = 3
   !> words of a row of a picture: of a grain and of a contact
   integer, parameter :: picture_words(2) = [13, 12]
   !> holes in the heap, over what is held
@@ -73,16 +72,18 @@ contains
     type(simulation_t), intent(in) :: simulation
     !> of the items of this rank
     integer(i8), intent(in) :: counts(5)
-    integer :: of_grain, of_contact
+    integer :: of_grain, of_contact, copies
 
-    associate (nd => simulation%decomposition%nd, output => simulation%config%output, &
-      & several => merge(2, 1, simulation%comm%size > 1))
+    copies = column_copies(merge(2, 1, simulation%comm%size > 1))
+    associate (nd => simulation%decomposition%nd, output => simulation%config%output)
       of_grain = 2 + nd + (3*nd - 3) + merge(nd, 0, simulation%decomposition%ni > 0)
       of_contact = merge(3 + 2*nd + merge(2*nd - 3, 0, simulation%problem%kernels%rolling_row > 0), 0, output%contacts)
-      bytes = 8*(counts(5)*of_grain*merge(grain_copies, copies(several), output%contacts) + counts(1)*of_contact*copies(several))
-      ! pictures are made while the rows of the state are there
-      if (output%vtk) bytes = max(bytes, 8*(counts(5)*of_grain + counts(1)*of_contact + &
-        & copies(several)*max(counts(5)*picture_words(1), counts(1)*picture_words(2))))
+      bytes = 8*max(counts(5)*(of_grain + copies*(3*nd - 3) + ordering_words), &
+        & counts(1)*merge(of_contact + copies*nd + ordering_words, 0, output%contacts))
+      if (.not. output%vtk) return
+      ! points are made from the rows of the bodies; of a line both ends are taken out of its row
+      bytes = max(bytes, 8*counts(5)*(of_grain + picture_words(1) + 3*copies + ordering_words))
+      if (output%contacts) bytes = max(bytes, 8*counts(1)*(picture_words(2) + 6*(1 + copies) + ordering_words))
     end associate
   end function written_bytes
 

@@ -265,7 +265,7 @@ class Import(RunTestCase):
             body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
         laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
         drives = still(2, 2).replace(" vlocy      1 " + " ".join(map(real, (0.0, 0.0, 0.0, 0.0, 1.0, 0.0))), " vlocy      1 evolution way.txt")
-        for rows, status in (("0 2\n0.05 7\n0.1 1\n", 0), ("0 2\n0.1 1\n0.05 7\n", 2), ("0\n1\n", 2), ("0 2\n0.1 nan\n", 2)):
+        for rows, status in (("0 2\n0.05 7\n0.1 1\n", 0), ("0.D0 2.d+0\n5.D-2 0.7D1\n1D-1 1\n", 0), ("", 2), ("0 2\n0.1 1\n0.05 7\n", 2), ("0\n1\n", 2), ("0 2\n0.1 nan\n", 2)):
             with self.subTest(rows=rows):
                 box = self.box(2, bodies, laws, drives)
                 write(os.path.join(box, "way.txt"), rows)

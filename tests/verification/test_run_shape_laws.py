@@ -311,6 +311,25 @@ class ShapeLaws(RunTestCase):
                         else:
                             self.assertGreater(fall, 2e-5)
 
+    def test_thin_corners(self):
+        """A triangle that falls about its thin tip lands on its side: its corners go into the ground by a step of their way, far less than
+        the rounding, and in the plane as in space."""
+        thin, leans = 0.1, 0.05
+        points = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, np.tan(thin))])
+        turned = np.array([[np.cos(leans), -np.sin(leans)], [np.sin(leans), np.cos(leans)]]) @ points.mean(axis=0) + [0.0, 1e-6]
+        flat = "shape t\nrounding 0.001\npolygon " + " ".join(repr(float(x)) for x in points.ravel()) + "\n"
+        solid = "shape t\nrounding 0.001\nhull " + " ".join(f"{float(x)!r} {y} {float(z)!r}" for y in (-0.5, 0.5) for x, z in points) + "\n"
+        ends = {}
+        for dimension, library, row in ((2, flat, body("t", floats(turned), leans)),
+                                        (3, solid, body("t", floats([turned[0], 0.0, turned[1]]), floats([np.cos(leans / 2), 0.0, -np.sin(leans / 2), 0.0])))):
+            directory = prepare(self.here(f"thin {dimension}"), dimension, [row], library)
+            run = run_case(shaped_case(dimension, [plane(dimension)], {"scene": {"friction": 0.5, "density": 1000.0}, "solver": {"accuracy": 1e-5},
+                                                                       "time": {"step": 2e-4, "steps": 750}, "output": {"every": 750}}), 1, directory)
+            self.assert_status(run, 0)
+            self.assertLess(run.history()["max_overlap"].max(), 0.05e-3)
+            ends[dimension] = self.track(run)[-1]
+        np.testing.assert_allclose(ends[2], ends[3][[0, 2]], atol=1e-6)
+
     def test_tiles_that_hang(self):
         """A tile thinner than the range of what holds it hangs on the four corners of its side, four times as strong as one: under a plane, a
         rectangle and in a cylinder, whose far corners are within the range too."""

@@ -329,20 +329,24 @@ contains
     end do
   end subroutine choose_side
 
-  !> The ends of a side that stands at an angle to what it touches: between those of the core and the sharp corners.
+  !> The ends of a side that stands at an angle to what it touches: between those of the core and the sharp corners. Long ways, to
+  !> thin corners, are left at smaller angles, so that none is moved by more than a part of the rounding into what it touches.
   pure subroutine blend_ends(piece, side, angle, ends)
     type(placed_piece_t), intent(in) :: piece
     type(side_t), intent(in) :: side
     !> [rad], or its sine
     real(dp), intent(in) :: angle
     real(dp), intent(out) :: ends(2, 2)
-    real(dp) :: share
-    integer :: next
+    real(dp) :: way, over
+    integer :: k, corner
 
-    share = max(0.0_dp, 1.0_dp - angle/blend_angle)
-    next = mod(side%k, piece%n) + 1
-    ends(:, 1) = side%ends(:, 1) + share*sum(side%along*(piece%corner(:, side%k) - side%ends(:, 1)))*side%along
-    ends(:, 2) = side%ends(:, 2) + share*sum(side%along*(piece%corner(:, next) - side%ends(:, 2)))*side%along
+    do k = 1, 2
+      corner = mod(side%k + k - 2, piece%n) + 1
+      way = sum(side%along*(piece%corner(:, corner) - side%ends(:, k)))
+      over = 1.0_dp
+      if (abs(way) > piece%rounding) over = abs(way)/piece%rounding
+      ends(:, k) = side%ends(:, k) + max(0.0_dp, 1.0_dp - angle/blend_angle*over)*way*side%along
+    end do
   end subroutine blend_ends
 
   !> The ends of the part that two sides have in common, where they face each other. The side that faces the other piece more, or

@@ -880,6 +880,8 @@ contains
     call refuse(column // "&enriched cg_tolerance = 0 /", "&enriched cg_tolerance = 0: expected a finite real number in (0, 1)")
     call refuse(column // "&enriched cg_tolerance = 1 /", "&enriched cg_tolerance = 1: expected a finite real number in (0, 1)")
     call refuse(column // "&enriched cg_max_iterations = 0 /", "&enriched cg_max_iterations = 0: expected an integer >= 1")
+    call refuse(column // "&output directory = '~/run' /", &
+      "&output directory = '~/run': expected a path without ~, which a shell replaces and this program does not")
     call refuse(column // "&output directory = '' /", &
       "&output directory = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
