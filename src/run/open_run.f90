@@ -429,13 +429,13 @@ contains
       & trim(merge("half of its thickness", "its radius           ", simulation%effects%shapes))// &
       & " in a step, and may have passed through something: use a smaller &time step", error)
     if (simulation%largest_overlap/worth_a_warning > simulation%overlap_allowed) then
-      text = "the solves leave errors that add up"
+      text = "the solves leave errors that add up; use a smaller &time step or &solver "//goal_name(simulation)
       ! a contact that sends bodies back begins at the first overlap that a step finds
       if (simulation%effects%restitution) &
         & text = "bodies that rebound overlap by up to their way in a step before they do, and "//text
+      if (simulation%largest_overlap <= simulation%tally%start_overlap) text = "there were as large ones at the start"
       call log%line("warning     overlaps of up to "//to_text(simulation%largest_overlap, 3)//" m, far beyond the "// &
-        & "overlap_allowed of "//to_text(simulation%overlap_allowed, 3)//" m: "//text//"; use a smaller &time step or &solver "// &
-        & goal_name(simulation), error)
+        & "overlap_allowed of "//to_text(simulation%overlap_allowed, 3)//" m: "//text, error)
     end if
     text = "finished    "//verdict_text(simulation)
     if (.not. kept) text = text//"; the last one is not in the results"

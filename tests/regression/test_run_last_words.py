@@ -92,6 +92,14 @@ class LastWords(RunTestCase):
             said.append(re.findall(r"^(?:overlaps|accuracy|finished).*$|^ +(?:U from|projected).*$", run.stdout, re.M))
         self.assertEqual(said[1], said[2])
 
+    def test_overlaps_of_the_start(self):
+        """Overlaps that were there at the start are no errors of solves: the log says so, and advises nothing."""
+        kept = merged(PAIR, {"scene": {"overlap_allowed": 1e-4}, "time": {"steps": 1}})
+        run = run_case(kept, 1, self.here("overlaps_of_the_start"))
+        self.assert_status(run, 0)
+        self.assertIn("m: there were as large ones at the start\n", run.stdout)
+        self.assertNotIn("the solves leave errors that add up", run.stdout)
+
     def test_shared_grains(self):
         """Shifts are those of the places in the results, a grain that two subdomains share counting once."""
         places, x = [], 0.0

@@ -223,13 +223,23 @@ contains
         kept = kept .and. norm2(to_edge) > tolerance
       end do
       if (.not. kept) cycle
-      n = n + 1
-      manifold%point(:, n) = manifold%point(:, c)
-      manifold%gap(n) = manifold%gap(c)
-      manifold%key(n) = manifold%key(c)
+      call keep_point(c, n, manifold)
     end do
     manifold%n = n
   end subroutine keep_corners
+
+  !> Keep point `c` of a manifold as the next of those kept.
+  pure subroutine keep_point(c, n, manifold)
+    integer, intent(in) :: c
+    !> points kept; one more afterwards
+    integer, intent(inout) :: n
+    type(manifold_t), intent(inout) :: manifold
+
+    n = n + 1
+    manifold%point(:, n) = manifold%point(:, c)
+    manifold%gap(n) = manifold%gap(c)
+    manifold%key(n) = manifold%key(c)
+  end subroutine keep_point
 
   !> The contacts of a piece in space that is no ball, in its axes.
   pure subroutine find_polyhedron_contacts(piece, radius, near, alert, most, found)
@@ -453,10 +463,7 @@ contains
         if (is_in_plane(k)) is_taken = has_point(near%corner(:, :, k), foot, tolerance_for(near, rounding))
       end do
       if (is_taken) cycle
-      n = n + 1
-      manifold%point(:, n) = manifold%point(:, c)
-      manifold%gap(n) = manifold%gap(c)
-      manifold%key(n) = manifold%key(c)
+      call keep_point(c, n, manifold)
     end do
     manifold%n = n
   end subroutine leave_plane
