@@ -105,7 +105,7 @@ class TooLarge(RunTestCase):
         big = self.case("big.nml", {"scene": {"lattice_count": [100000, 10000]}})
         for arguments in ((big,), ("--check", big)):
             self.refused(limited("gravier", *arguments, directory=here, addresses=6 * 10**9), 4,
-                         r"big\.nml: &scene lattice_count: 1000000000 grains: at least 540\.0 GB of memory are needed "
+                         r"big\.nml: &scene lattice_count: 1000000000 grains: at least 520\.0 GB of memory are needed "
                          r"on this machine, where [\d.]+ [GM]B are free$")
         write(self.here("sample.nml"), namelist({
             "scene": {"bodies": "sample", "dimension": 2},
@@ -133,7 +133,7 @@ class TooLarge(RunTestCase):
         # the launcher has no limit, and MPI enough to start
         run = self.start([MPIEXEC, "-n", "1", "sh", "-c", f"ulimit -v 700000; exec {PROGRAMS}/gravier {case}"], self.here(""))
         self.assertEqual(run.returncode, 4, run)
-        self.assertRegex(run.stderr.splitlines()[0], r"run\.nml: &scene lattice_count: 2000000 grains: at least 1\.1 GB of memory are needed "
+        self.assertRegex(run.stderr.splitlines()[0], r"run\.nml: &scene lattice_count: 2000000 grains: at least 1\.0 GB of memory are needed "
                          r"on a rank, which may still have [\d.]+ MB \(ulimit -v\)$")
 
         # rows of grains alone would fit, and a file of before stays as it was
