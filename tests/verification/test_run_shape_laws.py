@@ -311,6 +311,14 @@ class ShapeLaws(RunTestCase):
                         else:
                             self.assertGreater(fall, 2e-5)
 
+    def test_clusters_on_each_other(self):
+        """Two clusters of two disks, one on the other: their disks, which are the balls about the pieces, bear the upper one."""
+        library = "shape pair\ndisk -0.1 0 0.1\ndisk 0.1 0 0.1\n"
+        directory = prepare(self.here("pairs"), 2, [body("pair", [0.0, 0.1], 0.0), body("pair", [0.0, 0.3], 0.0)], library)
+        run = run_case(shaped_case(2, [plane(2)], {"time": {"step": 1e-3, "steps": 50}, "output": {"every": 50}}), 1, directory)
+        self.assert_status(run, 0)
+        np.testing.assert_allclose(self.track(run, place=1)[-1], [0.0, 0.3], atol=1e-5)
+
     def test_thin_corners(self):
         """A triangle that falls about its thin tip lands on its side: its corners go into the ground by a step of their way, far less than
         the rounding, and in the plane as in space."""
