@@ -385,14 +385,7 @@ contains
     integer :: k, lead
 
     lead = found%candidates%item(found%candidates%order(first))%place
-    is_in_plane(:) = lies_in_plane(near, lead, rounding)
-    n = 1
-    corner(:, :, 1) = near%corner(:, :, lead)
-    do k = 1, near%n
-      if (k == lead .or. .not. is_in_plane(k)) cycle
-      n = n + 1
-      corner(:, :, n) = near%corner(:, :, k)
-    end do
+    call gather_plane(near, lead, rounding, is_in_plane, n, corner)
     associate (chosen => found%candidates%item(found%candidates%order(first)))
       do k = 1, found%candidates%n
         associate (item => found%candidates%item(k))
@@ -405,27 +398,35 @@ contains
     end associate
   end subroutine take_plane
 
-  !> Which facets lie in the plane of one.
-  pure function lies_in_plane(near, lead, rounding) result(lies)
+  !> The facets that lie in the plane of one, which comes first.
+  pure subroutine gather_plane(near, lead, rounding, is_in_plane, n, corner)
     type(near_facets_t), intent(in) :: near
     !> place of the one
     integer, intent(in) :: lead
     !> of the piece [m]
     real(dp), intent(in) :: rounding
-    logical :: lies(near%n)
+    logical, intent(out) :: is_in_plane(near%n)
+    integer, intent(out) :: n
+    !> the first n [m]
+    real(dp), intent(out), contiguous :: corner(:, :, :)
     real(dp) :: normal(3), height, room
     integer :: k, c
 
     call find_facet_normal(near%corner(:, :, lead), normal)
     room = min(over_tolerance*near%tolerance, in_plane*rounding)
+    n = 1
+    corner(:, :, 1) = near%corner(:, :, lead)
     do k = 1, near%n
-      lies(k) = .true.
+      is_in_plane(k) = .true.
       do c = 1, 3
         height = dot_product(normal, near%corner(:, c, k) - near%corner(:, 1, lead))
-        lies(k) = lies(k) .and. abs(height) <= room
+        is_in_plane(k) = is_in_plane(k) .and. abs(height) <= room
       end do
+      if (k == lead .or. .not. is_in_plane(k)) cycle
+      n = n + 1
+      corner(:, :, n) = near%corner(:, :, k)
     end do
-  end function lies_in_plane
+  end subroutine gather_plane
 
   !> Whether one of some facets has a point.
   pure logical function is_on_one(corner, point, tolerance) result(is_on)
@@ -449,21 +450,15 @@ contains
     !> of the piece [m]
     real(dp), intent(in) :: rounding
     type(manifold_t), intent(inout) :: manifold
-    logical :: is_in_plane(near%n), is_taken
-    real(dp) :: foot(3)
-    integer :: c, k, n
+    logical :: is_in_plane(near%n)
+    real(dp) :: foot(3), corner(3, 3, near%n)
+    integer :: c, n, n_facets
 
-    is_in_plane(:) = lies_in_plane(near, lead, rounding)
+    call gather_plane(near, lead, rounding, is_in_plane, n_facets, corner)
     n = 0
     do c = 1, manifold%n
       call find_foot_of(manifold, c, foot)
-      is_taken = .false.
-      do k = 1, near%n
-        if (is_taken) exit
-        if (is_in_plane(k)) is_taken = has_point(near%corner(:, :, k), foot, tolerance_for(near, rounding))
-      end do
-      if (is_taken) cycle
-      call keep_point(c, n, manifold)
+      if (.not. is_on_one(corner(:, :, 1:n_facets), foot, tolerance_for(near, rounding))) call keep_point(c, n, manifold)
     end do
     manifold%n = n
   end subroutine leave_plane
