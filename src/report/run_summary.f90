@@ -79,14 +79,15 @@ contains
         & tally%worst_error <= solver%accuracy .and. tally%unbounded + tally%diverged == 0)) then
         text = "velocities are within the accuracy "//to_text(solver%accuracy, 3)//": a larger &solver tolerance, now "// &
           & to_text(solver%tolerance, 3)//", if that is enough"
+      else if (tally%stagnated > 0 .and. tally%stagnated + tally%exhausted >= max(tally%unbounded, tally%diverged) .and. &
+        & .not. allocated(fallback%method) .and. solver%method /= "newton" .and. .not. simulation%effects%rolling) then
+        text = "&solver fallback = 'newton' takes over solves that stagnate"
       else if (tally%stagnated < max(tally%exhausted, tally%unbounded, tally%diverged)) then
         text = "a smaller &time step"
         if (tally%unbounded >= max(tally%exhausted, tally%diverged)) text = text// &
           & ", or more room: bodies that cannot part are pressed together"
         if (tally%exhausted > max(tally%unbounded, tally%diverged)) text = "a larger &solver max_iterations, now "// &
           & to_text(solver%max_iterations)//", or "//text
-      else if (.not. allocated(fallback%method) .and. solver%method /= "newton" .and. .not. simulation%effects%rolling) then
-        text = "&solver fallback = 'newton' takes over solves that stagnate"
       else if (tally%stagnated > fallback%taken - fallback%solved + fallback%passed_over .and. allocated(fallback%method)) then
         text = "a larger &solver fallback_contacts, now "//to_text(solver%fallback_contacts)// &
           & ": Newton's method takes over solves of so many contacts at most"

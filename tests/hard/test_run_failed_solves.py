@@ -121,9 +121,12 @@ class FailedSolves(RunTestCase):
         run = run_case(merged(self.case, alone, {
             "scene": {"bodies_file": self.here("heavy.csv")}, "boundary": {"shape": "plane", "normal": [0.0, 1.0]},
             "solver": {"method": "nlgs", "max_iterations": 1000}}), 1, self.here("momentum"))
-        self.assertRegex(run.stdout, r"warning +accelerated sweeps make no progress: Nesterov momentum suspended twice in step 1")
-        self.assertRegex(run.stdout, r"\nnesterov +\d+ restarts and 2 suspensions of the momentum\n")
-        self.assertRegex(run.stdout, r"\nwarnings .*Nesterov momentum suspended 2")
+        # after 200 iterations without progress, and three starts anew of as many
+        self.assertRegex(run.stdout, r"warning +accelerated sweeps make no progress: Nesterov momentum suspended once in step 1")
+        restarts, suspended = re.search(r"\nnesterov +(\d+) restarts and (\d+) suspensions? of the momentum\n", run.stdout).groups()
+        self.assertGreaterEqual(int(restarts), 3)
+        self.assertEqual(suspended, "1")
+        self.assertRegex(run.stdout, r"\nwarnings .*Nesterov momentum suspended 1")
 
     def test_divergence_after_good_steps(self):
         """A method that diverges only when the grains have met the ground: the steps before stay, whole and right."""

@@ -77,6 +77,41 @@ class LightBodies(RunTestCase):
         heights = [results[f"/steps/{step}/bodies/position"][0, 1] for step in steps_of(results)]
         self.assertGreater(min(heights), 0.5 - 0.02 * STEP * speed)
 
+    def by_residual(self, name, grains, boundaries, steps=100, step=1e-3, **scene):
+        directory = self.here(name)
+        os.makedirs(directory)
+        write(os.path.join(directory, "bodies.csv"), bodies_csv(grains))
+        return run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "bodies.csv", "friction": 0.0, **scene},
+                         "boundary": boundaries, "time": {"step": step, "steps": steps}, "solver": {"criterion": "residual"},
+                         "output": {"directory": "results", "every": steps, "contacts": False}}, 1, directory)
+
+    def test_residual_sees_new_contacts(self):
+        """A contact that has no impulse yet does not end a solve by a small residual: the residual is relative to the impulses, or the
+        momentum, of heavier or more loaded bodies."""
+        floor = {"name": "ground", "shape": "plane", "normal": [0, 1]}
+        wall = {"name": "wall", "shape": "plane", "normal": [1, 0], "velocity": [0.1, 0.0]}
+        run = self.by_residual("pushed", [Grain((0.5, 0.0), radius=0.5, mass=1e-4), Grain((1.5, 0.0), radius=0.5, mass=1.0)], [wall],
+                               step=1e-2, gravity=[0.0, 0.0])
+        self.assert_status(run, 0)
+        bodies = run.results()["/steps/100/bodies/velocity"]
+        np.testing.assert_allclose(bodies[:, 0], 0.1, rtol=0.2)
+        self.assertLess(run.history()["max_overlap"].max(), 2e-3)
+        # it bounces back with 0.8 of its speed; a free disk beside it is a million times as heavy
+        run = self.by_residual("bounced", [Grain((0.5, 0.5), radius=0.5, mass=1e-3, velocity=(0.0, -1.0)),
+                                           Grain((3.0, 0.5), radius=0.5, mass=1e3, velocity=(2.0, 0.0))], [floor],
+                               gravity=[0.0, 0.0], restitution=0.8, wall_restitution=0.8)
+        self.assert_status(run, 0)
+        self.assertAlmostEqual(run.results()["/steps/100/bodies/velocity"][0, 1], 0.8, places=9)
+        # a paddle meets a loose disk; as heavy ones beside it are pressed together
+        paddle = {"name": "paddle", "shape": "segment", "point": [-0.002, 0.0], "end": [-0.002, 1.0], "velocity": [0.05, 0.0]}
+        lid = {"name": "lid", "shape": "segment", "point": [5.0, 3.0], "end": [8.0, 3.0], "free": [False, True], "mass": 100.0,
+               "force": [0.0, -1e6]}
+        run = self.by_residual("paddle", column(0.5, 0.0, 1) + column(6.5, 0.0, 3), [floor, lid, paddle], steps=400)
+        self.assert_status(run, 0)
+        self.assertAlmostEqual(run.results()["/steps/400/bodies/velocity"][0, 0], 0.05, places=9)
+        # it gives way before overlaps are projected, at 5 mm
+        self.assertAlmostEqual(run.results()["/steps/400/bodies/position"][0, 0], 0.5 - 0.002 + 0.05 * 0.4, delta=1e-4)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -453,6 +453,18 @@ class Fclib(RunTestCase):
                              {"masses_2d.h5", "masses_3d.h5"})
             self.assertNotIn("no_solution", rows["verdict"])
 
+    def test_heavy_on_light_is_no_proof(self):
+        """A disk of 1 kg on the ground bears one of M kg: impulses of M times the load of the light one are a solution, however large."""
+        for mass in (1e6, 1e7, 9e7, 1e9, 1e12):
+            w = np.array([[1.0, 0, -1, 0], [0, 3, 0, 1], [-1, 0, 1 + 1 / mass, 0], [0, 1, 0, 3 + 3 / mass]])
+            write_local(self.path(f"heavy{mass:.0e}.h5"), w, np.array([-0.1, 0, 0, 0]), np.full(2, 0.5), dimension=2)
+        for method in ("auto", "nlgs", "momentum", "newton"):
+            self.solve(*(f"heavy{mass:.0e}.h5" for mass in (1e6, 1e7, 9e7, 1e9, 1e12)), "--method", method, "--csv", "results.csv", status=3)
+            rows = read_table(self.path("results.csv"))
+            self.assertEqual(set(rows["proof"]), {"0"}, method)
+            if method in ("auto", "newton"):
+                self.assertEqual(rows["verdict"][:2], ["solved"] * 2)
+
     def test_impulses_beyond_loads_end(self):
         # a wedge so narrow that the grain slides out by impulses of 5e9: a solution, but none that loads can make, and Newton's
         # method comes to where rounding hides what a step could change

@@ -106,7 +106,7 @@ class Newton(RunTestCase):
         lines += [f"{number},0.5,1,{x},0.5,0,0,0" for number, x in ((len(places) + 1, 35), (len(places) + 2, 36))]
         bodies = write(self.here("heap.csv"), "\n".join(["id,radius,mass,x,y,vx,vy,omega", *lines]) + "\n")
         run = run_case({
-            "scene": {"dimension": 2, "bodies": "file", "bodies_file": bodies, "friction": 0.3},
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": bodies, "friction": 0.25},
             "boundary": [{"shape": "plane", "normal": [0.0, 1.0]}, {"shape": "plane", "point": [19.5, 0.0], "normal": [1.0, 0.0]}],
             "time": {"step": 1e-3, "steps": 1},
             "solver": {"method": "newton", "accuracy": 1e-4, "tolerance": 1e-6, "fallback": "none", "max_iterations": 10000},

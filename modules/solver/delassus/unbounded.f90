@@ -8,8 +8,9 @@
 !>
 !>     0 <= z.v = z.W r + z.q,   -z.q <= r.W^T z <= max(s |r|) sum(|W^T z|/s),
 !>
-!> s the stiffness of each contact. Loads that do not grow need max(s |r|) >= -z.q/sum(|W^T z|/s) =: B max|q|. Where the bound B is
-!> beyond what loads can make, this proves that there is no solution. With friction in z it does not: z.v may be negative where
+!> s the stiffness of each contact. Loads that do not grow need max(s |r|) >= -z.q/sum(|W^T z|/s) =: B max|q|. A heavy body on a light
+!> one needs a B of their ratio of masses. Where B is beyond what loads make in other problems, and what is left of W^T z besides is
+!> no more than roundings may be, this proves that there is no solution. With friction in z it does not: z.v may be negative where
 !> contacts slip. Then it marks iterations that grow for ever, as long as contacts keep their states.
 module gravier_unbounded
   use gravier_kinds, only: dp
@@ -23,6 +24,8 @@ module gravier_unbounded
   integer, parameter :: growth_none = 0, growth_marked = 1, growth_proven = 2
   !> marks one after the other that end an iteration
   integer, parameter :: enough_marks = 2
+  !> roundings of W z up to which it counts as 0, for a mark and for a proof
+  real(dp), parameter :: nearly_balanced = 1.0e6_dp, balanced = 1.0e2_dp
 
   !> What is known of the growth of impulses.
   type :: growth_t
@@ -42,8 +45,8 @@ module gravier_unbounded
   type :: ray_sums_t
     !> z.q, and what it may be wrong by
     real(dp), private :: work = 0.0_dp, work_error = 0.0_dp
-    !> sum of |W z|/s, errors of rounding included
-    real(dp), private :: motion = 0.0_dp
+    !> sums of |W z|/s, and of what it may be wrong by
+    real(dp), private :: motion = 0.0_dp, rounding = 0.0_dp
     !> max|q|
     real(dp), private :: speed = 0.0_dp
     !> largest s |z|, and its contact
@@ -52,6 +55,7 @@ module gravier_unbounded
   contains
     procedure :: add => ray_sums_add
     procedure :: bound => ray_sums_bound
+    procedure :: tells => ray_sums_tells
   end type ray_sums_t
 
 contains
@@ -77,7 +81,8 @@ contains
     length = norm2(z)
     self%work = self%work + dot_product(z, q)
     self%work_error = self%work_error + epsilon(length)*length*norm2(q)
-    self%motion = self%motion + (norm2(wz) + wz_error)/stiffness
+    self%motion = self%motion + norm2(wz)/stiffness
+    self%rounding = self%rounding + wz_error/stiffness
     self%speed = max(self%speed, norm2(q))
     if (stiffness*length > self%largest) then
       self%largest = stiffness*length
@@ -90,9 +95,16 @@ contains
     class(ray_sums_t), intent(in) :: self
 
     bound = 0.0_dp
-    if (self%work + self%work_error < 0.0_dp .and. self%motion > 0.0_dp) &
-      & bound = -(self%work + self%work_error)/(self%motion*self%speed)
+    if (self%work + self%work_error < 0.0_dp .and. self%motion + self%rounding > 0.0_dp) &
+      & bound = -(self%work + self%work_error)/((self%motion + self%rounding)*self%speed)
   end function ray_sums_bound
+
+  !> Whether z speaks against a solution: it needs impulses beyond those of loads, and bodies balance it but for so many roundings.
+  pure logical function ray_sums_tells(self, roundings) result(tells)
+    class(ray_sums_t), intent(in) :: self
+    real(dp), intent(in) :: roundings
+    tells = self%bound() > most_impulse .and. self%motion <= roundings*self%rounding
+  end function ray_sums_tells
 
   !> Take the look at a change of impulses into account: a proof stays, marks count one after the other.
   subroutine note_growth(problem, change, growth)
@@ -124,11 +136,11 @@ contains
     call sum_ray(problem, change, .false., sums)
     growth%bound = sums%bound()
     growth%contact = sums%contact
-    if (.not. growth%bound > most_impulse) return
+    if (.not. sums%tells(nearly_balanced)) return
     growth%kind = growth_marked
     change(2:, :) = 0.0_dp
     call sum_ray(problem, change, .true., sums)
-    if (.not. sums%bound() > most_impulse) return
+    if (.not. sums%tells(balanced)) return
     growth%kind = growth_proven
     growth%bound = sums%bound()
     growth%contact = sums%contact

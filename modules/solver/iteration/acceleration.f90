@@ -14,8 +14,9 @@ module gravier_acceleration
   real(dp), parameter :: growth_allowed = 1.02_dp
   !> least 1 - beta after an idle phase; its factor after a window that grew, and after one that shrank
   real(dp), parameter :: wary_margin = 0.3_dp, widen = 3.0_dp, narrow = 0.7_dp
-  !> iterations without progress to plain ones; ratio of window sums taken for progress
-  integer, parameter :: idle_limit = 200
+  !> iterations without progress after which momentum begins anew; so often before plain iterations come; ratio of window sums
+  !> taken for progress
+  integer, parameter :: idle_limit = 200, most_starts = 3
   real(dp), parameter :: progress_made = 0.8_dp
   !> How strongly acceleration answers to growth.
   type :: steering_t
@@ -49,7 +50,7 @@ module gravier_acceleration
   !> beta = min((t_k - 1)/t_k+1, 1 - margin), t_k+1 = (1 + sqrt(1 + 4 t_k^2))/2 (Nesterov 1983), and steers itself by the
   !> changes |r - y|^2 of the first sweeps, see doc/theory.md section 22: growth from one iteration to the next shortens the
   !> memory t; growth from one window of iterations to the next widens the margin, decay narrows it; after many windows
-  !> without progress come as many plain iterations as the solve has had.
+  !> without progress momentum begins anew, and after some such starts come as many plain iterations as the solve has had.
   type :: acceleration_t
     logical :: on = .false.
     !> the next iteration is a plain one: it extrapolates nothing and keeps nothing
@@ -66,11 +67,17 @@ module gravier_acceleration
     real(dp) :: change = unknown, window_change = 0.0_dp, last_window_change = unknown, lowest = unknown
     !> iterations of this solve, those of the windows since `lowest`, plain iterations to come
     integer :: iterations = 0, idle = 0, plain = 0
+    !> times that momentum has begun anew since the start or the last plain iterations; iterations before the last start
+    integer, private :: starts = 0, before = 0
+    !> all iterations to come are plain ones
+    logical, private :: has_ended = .false.
     type(acceleration_part_t), allocatable :: part(:)
   contains
     procedure :: choose_steering => acceleration_choose_steering
     procedure :: steer => acceleration_steer
     procedure :: whole => acceleration_whole
+    procedure :: extrapolates => acceleration_extrapolates
+    procedure :: end_for_good => acceleration_end_for_good
     procedure :: held => acceleration_held
   end type acceleration_t
 
@@ -160,12 +167,26 @@ contains
     self%beta = min((t - 1.0_dp)/self%t, 1.0_dp - self%margin, self%most)
   end subroutine acceleration_steer
 
-  !> Whether the next iteration takes the whole of each local solve: those of the first window, where small problems end exactly,
-  !> and plain ones do.
+  !> Whether the next iteration takes the whole of each local solve: those of the first window after a start, where small problems
+  !> end exactly, and plain ones do.
   pure logical function acceleration_whole(self) result(whole)
     class(acceleration_t), intent(in) :: self
-    whole = self%resting .or. self%iterations < self%steering%window
+    whole = self%resting .or. self%iterations - self%before < self%steering%window
   end function acceleration_whole
+
+  !> Whether this solve is accelerated, be it between plain iterations.
+  pure logical function acceleration_extrapolates(self) result(extrapolates)
+    class(acceleration_t), intent(in) :: self
+    extrapolates = self%on .and. .not. self%has_ended
+  end function acceleration_extrapolates
+
+  !> Only plain iterations are left in this solve.
+  pure subroutine acceleration_end_for_good(self)
+    class(acceleration_t), intent(inout) :: self
+
+    self%has_ended = .true.
+    self%plain = huge(self%plain)
+  end subroutine acceleration_end_for_good
 
   !> The end of a window of iterations: the margin, and whether acceleration still pays.
   pure subroutine close_window(acceleration)
@@ -182,6 +203,7 @@ contains
         acceleration%t = 1.0_dp
         acceleration%margin = wary_margin
         acceleration%idle = 0
+        acceleration%starts = 0
         acceleration%lowest = acceleration%window_change
       end if
     else if (acceleration%window_change < progress_made*acceleration%lowest) then
@@ -189,11 +211,34 @@ contains
       acceleration%idle = 0
     else
       acceleration%idle = acceleration%idle + acceleration%steering%window
-      if (acceleration%idle >= idle_limit) acceleration%plain = acceleration%iterations
+      if (acceleration%idle >= idle_limit) then
+        if (acceleration%starts < most_starts) then
+          call begin_anew(acceleration)
+          return
+        end if
+        acceleration%plain = acceleration%iterations
+      end if
     end if
     acceleration%last_window_change = acceleration%window_change
     acceleration%window_change = 0.0_dp
   end subroutine close_window
+
+  !> Momentum begins as in a solve that starts from the impulses of now. Where friction lets contacts change for ever, each start
+  !> takes the impulses another way, and many of these ways pass a solution.
+  pure subroutine begin_anew(acceleration)
+    type(acceleration_t), intent(inout) :: acceleration
+
+    acceleration%starts = acceleration%starts + 1
+    acceleration%restarted = acceleration%restarted + 1
+    acceleration%before = acceleration%iterations
+    acceleration%t = 1.0_dp
+    acceleration%margin = acceleration%steering%first_margin
+    acceleration%idle = 0
+    acceleration%change = unknown
+    acceleration%window_change = 0.0_dp
+    acceleration%last_window_change = unknown
+    acceleration%lowest = unknown
+  end subroutine begin_anew
 
   !> Set the local operators to the full step of a local solve, or to the relaxation factors with which acceleration gains most.
   subroutine change_relaxation_factors(acceleration, problem)

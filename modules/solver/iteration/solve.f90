@@ -7,116 +7,21 @@ module gravier_solve
   use gravier_cell_response, only: respond
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
-  use gravier_convergence_history, only: convergence_history_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_check_schedule, only: check_schedule_t, growth_limit
   use gravier_defect_growth, only: defect_growth_t
-  use gravier_stagnation, only: stagnation_t
-  use gravier_creeping_groups, only: creep_t
+  use gravier_stagnation, only: stagnation_t, plain_may_help
   use gravier_layer_trial, only: layer_trial_t
   use gravier_fresh_start, only: fresh_start_t
+  use gravier_solve_report, only: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, n_traced, by_velocity, &
+    & by_residual, by_error, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   use gravier_residual_verdict, only: residual_ends, residual_in_vain, find_residual_verdict, grow_in_vain, &
     & excess_of, vain_look_t
   implicit none
   private
-  public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, solve_contacts
-  public :: by_velocity, by_residual, by_error
+  public :: solve_contacts
+  public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, by_velocity, by_residual, by_error
   public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
-
-  !> what ends a solve: the velocity error and the residual; the residual (gravier_residual_verdict); the error of known impulses
-  integer, parameter :: by_velocity = 1, by_residual = 2, by_error = 3
-
-  !> met; not met in max_iterations; grown beyond bounds; not met, and nothing gained any more; no solution seems to exist
-  integer, parameter :: solve_converged = 0, solve_exhausted = 1, solve_diverged = 2, solve_stagnated = 3, solve_unbounded = 4
-
-  !> figures of a check that a trace keeps
-  integer, parameter :: n_traced = 6
-
-  type :: solve_control_t
-    integer :: criterion = by_residual
-    !> of the residual, or the error
-    real(dp) :: tolerance = 1.0e-4_dp
-    !> velocity error over the velocity scale of the problem
-    real(dp) :: accuracy = 0.1_dp
-    integer :: max_iterations = 10000
-    !> iterations between two checks; of these, some that would tell nothing new are left out. Accelerated sweeps have their sums
-    !> after each iteration, and are checked as soon as these indicate convergence
-    integer :: check_every = 10
-    !> keep the figures of every check, and leave none out
-    logical :: trace = .false.
-    !> try a start that carries loads across layers
-    logical :: layered = .true.
-    !> `figure_ratio` of the report of a solve before this one, 0 where there was none: it tells when checks
-    !> of accelerated sweeps that ask for the velocity error are worth making
-    real(dp) :: figure_ratio = 0.0_dp
-  end type solve_control_t
-
-  !> The known impulses of a problem, for the criterion 'error'.
-  type, abstract :: exact_solution_t
-  contains
-    procedure(error_of), deferred :: error
-  end type exact_solution_t
-
-  abstract interface
-    !> |r - r_exact| / |r_exact|. Collective.
-    real(dp) function error_of(self, problem)
-      import :: exact_solution_t, contact_problem_t, dp
-      implicit none
-      class(exact_solution_t), intent(in) :: self
-      type(contact_problem_t), intent(in) :: problem
-    end function error_of
-  end interface
-
-  type :: solve_report_t
-    !> solve_converged or the reason why not
-    integer :: status = solve_exhausted
-    integer :: iterations = 0
-    real(dp) :: residual = 0.0_dp, jump = 0.0_dp
-    !> the estimate of gravier_velocity_error, and what it is compared with [m/s]
-    real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
-    !> largest velocity by which a contact violates its law, and what is allowed of it; 0 where it is not known [m/s]
-    real(dp) :: violation = 0.0_dp, violation_allowed = 0.0_dp
-    !> whether the velocities are within the accuracy, whatever the criterion; whether that is known, as it is not after few
-    !> iterations. Both hold of solves that have converged alone.
-    logical :: accurate = .true., judged = .true.
-    !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
-    real(dp) :: layered_sweeps = 0.0_dp
-    logical :: layered = .false.
-    !> relative error on the impulses, negative where no exact solution is known
-    real(dp) :: error = -1.0_dp
-    !> what the goal is compared with at the end, and that: the residual or the error and the tolerance; or the velocity error over
-    !> its scale, or the residual in its place where that is farther from its tolerance, and the accuracy
-    real(dp) :: figure = 0.0_dp, goal = 0.0_dp
-    !> that figure over what the last iteration moved impulses by, relative to them; the geometric mean of it and of that of the
-    !> control, where there is one, because single solves scatter; 0 of a solve that tells nothing to the next one
-    real(dp) :: figure_ratio = 0.0_dp
-    !> of a solve that stagnated
-    type(creep_t) :: creep
-    !> how the figure came down
-    type(convergence_history_t) :: history
-    !> on this rank: the whole solve, and what comes before its first check [s]
-    real(dp) :: seconds = 0.0_dp, start_seconds = 0.0_dp
-    !> one column a check, n_trace of them: iteration, residual, jump, error, velocity error, seconds of this rank without those of
-    !> checks (n_traced, room)
-    integer :: n_trace = 0
-    real(dp), allocatable :: trace(:, :)
-  end type solve_report_t
-
-  !> Who is told how a solve goes on.
-  type, abstract :: solve_watch_t
-  contains
-    procedure(look_at), deferred :: look
-  end type solve_watch_t
-
-  abstract interface
-    !> After an iteration, with the figures of the last check. Each rank is told on its own.
-    subroutine look_at(self, report)
-      import :: solve_watch_t, solve_report_t
-      implicit none
-      class(solve_watch_t), intent(inout) :: self
-      type(solve_report_t), intent(in) :: report
-    end subroutine look_at
-  end interface
 
   !> What a solve carries along.
   type :: solve_state_t
@@ -135,6 +40,8 @@ module gravier_solve
     !> the verdict on a residual that is within its tolerance, of by_velocity at some iterations alone
     integer :: verdict = residual_ends
     type(vain_look_t) :: look
+    !> accelerated sweeps have stagnated: plain ones come next
+    logical :: ends_momentum = .false.
   end type solve_state_t
 
 contains
@@ -174,6 +81,7 @@ contains
         if (allocated(error)) return
         if (.not. anew) call state%fresh%renew(problem, method, state%velocity, report%iterations, anew, error)
         if (allocated(error)) return
+        if (state%ends_momentum) call sweep_plainly(state, method, report%iterations, anew)
         if (anew) call state%schedule%forget_ratio()
       end if
       call state%velocity%tests%keep_copy(problem, method, report%iterations)
@@ -260,7 +168,7 @@ contains
     call method%see(problem, defect)
     if (control%criterion == by_error) report%error = exact%error(problem)
     call judge(state, problem, method, control, report, defect, finished)
-    if (control%trace) call keep_trace(report, start - state%began - state%checking)
+    if (control%trace) call report%keep_trace(start - state%began - state%checking)
     if (ieee_is_finite(report%figure)) call report%history%note(report%iterations, report%figure, report%goal)
     call state%schedule%note_check(report%iterations, report%figure, report%goal, has_estimate(state), state%velocity%believed_from)
     state%checking = state%checking + clock() - start
@@ -416,9 +324,10 @@ contains
       if (state%growth%unmended) then
         report%status = solve_diverged
       else if (report%iterations >= control%max_iterations) then
-        report%status = solve_exhausted
-        if (control%criterion == by_residual) report%status = merge(solve_unbounded, solve_exhausted, &
-          & grow_in_vain(problem, method, state%velocity, report%iterations))
+        report%status = merge(solve_stagnated, solve_exhausted, state%stagnation%is_last)
+        if (control%criterion == by_residual) then
+          if (grow_in_vain(problem, method, state%velocity, report%iterations)) report%status = solve_unbounded
+        end if
       else
         call judge_stagnation(state, problem, method, control, report, finished)
       end if
@@ -429,11 +338,12 @@ contains
     if (control%trace .or. .not. met) call take_figure(state, problem, control, report)
   end subroutine judge
 
-  !> Whether more iterations promise nothing: because there is no solution, or because the method finds none. Collective.
+  !> Whether more iterations promise nothing: because there is no solution, or because the method finds none. Where accelerated
+  !> sweeps gain nothing more, plain ones, which end what oscillates, follow first. Collective.
   subroutine judge_stagnation(state, problem, method, control, report, has_stagnated)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(method_t), intent(in) :: method
+    class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: has_stagnated
@@ -445,7 +355,7 @@ contains
     if (report%iterations == 0) return
     figures(1) = merge(report%figure, report%residual*(control%accuracy/control%tolerance), has_estimate(state))
     figures(2) = report%velocity_error
-    call state%stagnation%note(problem, report%iterations, figures, method%acceleration%on, &
+    call state%stagnation%note(problem, report%iterations, figures, method%acceleration%extrapolates(), &
       & merge(report%residual, 0.0_dp, report%residual > control%tolerance), due)
     if (.not. due) return
     if (state%velocity%levels%most_depth < 0) call state%velocity%levels%find_depth(problem)
@@ -455,30 +365,30 @@ contains
     else if (has_stagnated .and. method%persists) then
       has_stagnated = .false.
       call state%stagnation%go_on(problem, report%iterations)
+    else if (has_stagnated .and. method%acceleration%extrapolates() .and. &
+      & plain_may_help(report%iterations, state%velocity%levels%most_depth)) then
+      has_stagnated = .false.
+      state%ends_momentum = .true.
     else if (has_stagnated) then
       report%status = solve_stagnated
       call state%stagnation%describe(problem, report%creep)
     end if
   end subroutine judge_stagnation
 
-  subroutine keep_trace(report, seconds)
-    type(solve_report_t), intent(inout) :: report
-    !> since the start of the solve, without those of checks [s]
-    real(dp), intent(in) :: seconds
-    real(dp), allocatable :: longer(:, :)
+  !> Plain sweeps take the place of accelerated ones, to the end of the solve.
+  subroutine sweep_plainly(state, method, iteration, anew)
+    type(solve_state_t), intent(inout) :: state
+    class(method_t), intent(inout) :: method
+    !> iterations made
+    integer, intent(in) :: iteration
+    logical, intent(out) :: anew
 
-    if (report%n_trace == size(report%trace, 2)) then
-      allocate (longer(n_traced, 2*report%n_trace))
-      longer(:, 1:report%n_trace) = report%trace
-      call move_alloc(longer, report%trace)
-    end if
-    report%n_trace = report%n_trace + 1
-    report%trace(1, report%n_trace) = report%iterations
-    report%trace(2, report%n_trace) = report%residual
-    report%trace(3, report%n_trace) = report%jump
-    report%trace(4, report%n_trace) = report%error
-    report%trace(5, report%n_trace) = report%velocity_error
-    report%trace(6, report%n_trace) = seconds
-  end subroutine keep_trace
+    anew = .true.
+    state%ends_momentum = .false.
+    call method%acceleration%end_for_good()
+    method%work%suspended = method%work%suspended + 1
+    call state%stagnation%begin_last(iteration)
+    call state%velocity%begin_anew(iteration)
+  end subroutine sweep_plainly
 
 end module gravier_solve

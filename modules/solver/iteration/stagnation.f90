@@ -12,7 +12,7 @@ module gravier_stagnation
   use gravier_creeping_groups, only: creep_t, find_creep
   implicit none
   private
-  public :: stagnation_t
+  public :: stagnation_t, plain_may_help
 
   !> what is left of the figure where a solve has gained something
   real(dp), parameter :: gained = 0.9_dp
@@ -22,13 +22,16 @@ module gravier_stagnation
   !> which grow
   integer, parameter :: residual_patience = 4
   real(dp), parameter :: small_residual = 1.0e-3_dp
-  !> times the depth: iterations that every solve has
+  !> times the depth: iterations that every solve has; times those that plain sweeps have: the square of the depth up to which these
+  !> are tried, since a load spreads by plain sweeps as heat does
   integer, parameter :: waves = 6
 
   type :: stagnation_t
     !> lowest figure and lowest velocity error so far; iteration from which on the solve is looked at
     real(dp), private :: best(2) = huge(1.0_dp)
     integer, private :: next_look = 0
+    !> the method makes its last attempt, after it has stagnated: what it gains gives it no more time
+    logical :: is_last = .false.
     !> impulses after the iteration `kept_at`, of the subdomains of this rank; 0 where there are none
     integer, private :: kept_at = 0
     type(kept_impulses_t), allocatable, private :: kept(:)
@@ -37,6 +40,7 @@ module gravier_stagnation
     procedure :: judge => stagnation_judge
     procedure :: describe => stagnation_describe
     procedure :: go_on => stagnation_go_on
+    procedure :: begin_last => stagnation_begin_last
   end type stagnation_t
 
 contains
@@ -56,11 +60,13 @@ contains
     due = .false.
     if (any(figures < gained*self%best)) then
       where (figures < gained*self%best) self%best = figures
-      self%next_look = 2*iteration + merge(patience, plain_patience, accelerated)
-      if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
-        & self%next_look = iteration + residual_patience*(plain_patience + iteration)
-      self%kept_at = 0
-      return
+      if (.not. self%is_last) then
+        self%next_look = 2*iteration + merge(patience, plain_patience, accelerated)
+        if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
+          & self%next_look = iteration + residual_patience*(plain_patience + iteration)
+        self%kept_at = 0
+        return
+      end if
     end if
     if (self%kept_at == 0 .and. iteration >= self%next_look - watch) call keep_impulses(self, problem, iteration)
     due = iteration >= self%next_look .and. self%kept_at > 0 .and. iteration - self%kept_at >= watch
@@ -109,5 +115,24 @@ contains
     self%next_look = iteration + patience
     call keep_impulses(self, problem, iteration)
   end subroutine stagnation_go_on
+
+  !> Whether plain iterations may bring what accelerated ones do not, in the number that they would have.
+  pure logical function plain_may_help(iteration, depth)
+    integer, intent(in) :: iteration
+    !> of the problem, in contacts
+    integer, intent(in) :: depth
+    plain_may_help = real(depth, dp)**2 <= waves*real(plain_patience + iteration, dp)
+  end function plain_may_help
+
+  !> The method goes on in another way, by plain iterations, which have as many as the solve has had, and some more. They are slow
+  !> but gain something for ever, so that what they gain is no reason to wait for longer.
+  subroutine stagnation_begin_last(self, iteration)
+    class(stagnation_t), intent(inout) :: self
+    integer, intent(in) :: iteration
+
+    self%is_last = .true.
+    self%next_look = 2*iteration + plain_patience
+    self%kept_at = 0
+  end subroutine stagnation_begin_last
 
 end module gravier_stagnation

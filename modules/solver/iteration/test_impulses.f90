@@ -87,7 +87,7 @@ contains
     integer, intent(in) :: iteration
     integer :: s
 
-    if (method%acceleration%on .or. iteration < self%next_copy) return
+    if (method%acceleration%extrapolates() .or. iteration < self%next_copy) return
     self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
     self%taken_at = iteration
     do s = 1, size(self%part)
@@ -116,10 +116,10 @@ contains
     logical, intent(out) :: are_known
     integer :: s
 
-    are_known = iteration > 0 .and. (method%acceleration%on .or. self%has_copy(iteration))
+    are_known = iteration > 0 .and. (method%acceleration%extrapolates() .or. self%has_copy(iteration))
     if (.not. are_known) return
     do s = 1, size(problem%sub)
-      if (method%acceleration%on) then
+      if (method%acceleration%extrapolates()) then
         earlier(s)%value = method%acceleration%part(s)%impulse
       else
         earlier(s)%value = self%part(s)%previous
@@ -158,7 +158,7 @@ contains
         if (allocated(sub%attraction)) call take_attractions_off(sub, part)
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
-        if (method%acceleration%on .and. iteration > 0) then
+        if (method%acceleration%extrapolates() .and. iteration > 0) then
           call test(problem, s, part, method%acceleration%part(s)%impulse, levels(s)%power, parts(:, s), largest(1))
         else if (self%has_copy(iteration)) then
           call test(problem, s, part, part%previous, levels(s)%power, parts(:, s), largest(1))

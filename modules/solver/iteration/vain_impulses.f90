@@ -48,19 +48,19 @@ contains
   end function are_in_vain
 
   !> The largest speed at which something prescribed works against the impulse of a contact, along that impulse: a boundary, or the
-  !> shift of the law [m/s]. Where that is within the accuracy of a solve, so is any contradiction of what is prescribed.
-  !> Collective.
+  !> shift of the law [m/s]. A contact without an impulse whose bodies approach needs one along its normal. Where the speed is
+  !> within the accuracy of a solve, so is any contradiction of what is prescribed. With v_global evaluated. Collective.
   real(dp) function speed_against(problem) result(speed)
     type(contact_problem_t), intent(in) :: problem
-    real(dp), allocatable :: prescribed(:, :), v(:, :, :)
-    real(dp) :: impulse
+    real(dp), allocatable :: prescribed(:, :), v(:, :, :), now(:, :, :)
+    real(dp) :: z(problem%kernels%nf), impulse
     integer :: s, b, c, d
 
     speed = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), kernels => problem%kernels)
         allocate (prescribed, mold=sub%v_free)
-        allocate (v, mold=sub%impulse)
+        allocate (v, now, mold=sub%impulse)
         prescribed(:, :) = 0.0_dp
         do b = sub%n_grains + 1, sub%n_columns
           do d = 1, kernels%nv
@@ -68,14 +68,17 @@ contains
           end do
         end do
         call kernels%contact_velocity(sub%pair, sub%hot, prescribed, v)
+        call kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, now)
         do c = 1, sub%n_contacts
-          associate (r => sub%impulse(lane_of(c), 1:kernels%nf, block_of(c)))
-            impulse = norm2(r)
-            if (impulse > 0.0_dp) speed = max(speed, -(dot_product(r, v(lane_of(c), 1:kernels%nf, block_of(c))) &
-              & + work_of_shift(problem, sub%hot(lane_of(c), :, block_of(c)), r))/impulse)
+          associate (contact => sub%hot(lane_of(c), :, block_of(c)))
+            z(:) = sub%impulse(lane_of(c), 1:kernels%nf, block_of(c))
+            if (all(abs(z) <= 0.0_dp) .and. now(lane_of(c), 1, block_of(c)) + contact(kernels%row%shift) < 0.0_dp) z(1) = 1.0_dp
+            impulse = norm2(z)
+            if (impulse > 0.0_dp) speed = max(speed, -(dot_product(z, v(lane_of(c), 1:kernels%nf, block_of(c))) &
+              & + work_of_shift(problem, contact, z))/impulse)
           end associate
         end do
-        deallocate (prescribed, v)
+        deallocate (prescribed, v, now)
       end associate
     end do
     speed = problem%comm%highest(speed)

@@ -11,6 +11,7 @@ program test_momentum
   call test_growth_between_iterations()
   call test_growth_between_windows()
   call test_idle_windows()
+  call test_end_for_good()
   call test_few_contacts()
   call finish_checks()
   call MPI_Finalize()
@@ -89,29 +90,56 @@ contains
     call check(momentum%beta > 0.5_dp, "windows that shrink again: beta")
   end subroutine test_growth_between_windows
 
-  !> Ten windows without a fifth less: as many plain iterations as there were, then momentum again.
+  !> Ten windows without a fifth less: momentum begins anew, three times. Then come as many plain iterations as there were, and
+  !> momentum again, which may begin anew as often.
   subroutine test_idle_windows()
     type(acceleration_t) :: momentum
     integer :: k, plain
 
-    do k = 1, 219
+    do k = 1, 879
       call momentum%steer(1.0_dp)
+      if (k == 220 .or. k == 440 .or. k == 660) then
+        call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "idle: momentum begins anew")
+      else if (mod(k, 220) > 1) then
+        call check(momentum%beta > 0.0_dp, "idle: momentum until the limit")
+      end if
+      call check(momentum%whole() .eqv. mod(k, 220) < 20, "idle: the first window after a start takes whole local solves")
     end do
-    call check(momentum%beta > 0.5_dp, "idle: momentum until the limit")
     plain = 0
-    do k = 220, 439
+    do k = 880, 1759
       call momentum%steer(1.0_dp)
       if (abs(momentum%beta) <= 0.0_dp .and. momentum%resting .and. momentum%whole()) plain = plain + 1
     end do
-    call check_equal(plain, 220, "idle: plain iterations")
+    call check_equal(plain, 880, "idle: plain iterations")
     call momentum%steer(1.0_dp)
     call check(.not. momentum%resting, "idle: the last impulses are kept again")
     call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "idle: nothing to extrapolate from yet")
-    do k = 441, 480
+    do k = 1761, 1959
       call momentum%steer(1.0_dp)
     end do
     call check(momentum%beta > 0.5_dp, "idle: momentum again")
+    call momentum%steer(1.0_dp)
+    call check_close(momentum%beta, 0.0_dp, tiny(1.0_dp), "idle: momentum begins anew again")
+    call check(.not. momentum%resting, "idle: without plain iterations")
   end subroutine test_idle_windows
+
+  !> An end for good leaves plain iterations alone, until the next solve.
+  subroutine test_end_for_good()
+    type(acceleration_t) :: momentum
+    integer :: k
+
+    momentum%on = .true.
+    do k = 1, 30
+      call momentum%steer(0.9_dp**k)
+    end do
+    call check(momentum%extrapolates(), "end: accelerated before")
+    call momentum%end_for_good()
+    call check(.not. momentum%extrapolates(), "end: not accelerated after")
+    do k = 31, 5000
+      call momentum%steer(0.9_dp**k)
+      call check(momentum%resting .and. momentum%whole(), "end: plain iterations")
+    end do
+  end subroutine test_end_for_good
 
   !> With few contacts growth shortens the memory by three tenths, and windows are shorter.
   subroutine test_few_contacts()
