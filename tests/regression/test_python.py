@@ -101,6 +101,24 @@ class Package(RunTestCase):
         with self.assertRaisesRegex(gravier.ResultsError, "expected the results of a run"):
             gravier.Run(self.here("nowhere"))
 
+    def test_frames(self):
+        """Components have the names of what they are along: axes, the normal and the tangents of a contact, the real part of a quaternion. A
+        dictionary stands in for a table of pandas."""
+        run, table = self.run_, gravier.Table
+        with unittest.mock.patch.dict(sys.modules, {"pandas": types.SimpleNamespace(DataFrame=dict)}):
+            bodies, contacts = run.bodies().frame(), run.contacts().frame()
+            space = table(impulse=np.ones((1, 3)), moment=np.ones((1, 3)), orientation=np.ones((1, 4)), spin=np.ones((1, 3)), edge=np.ones((1, 3)))
+            plane = table(moment=np.ones((0, 1)), orientation=np.ones((0, 1)), origin=np.ones((0, 1)), corners=np.ones((0, 2, 2)), stress=np.ones((0, 2, 2)))
+            space, plane, forces = space.frame(), plane.frame(), table(moment=np.ones((1, 3))).frame()
+        self.assertEqual([name for name in bodies if "_" in name], ["position_x", "position_y", "velocity_x", "velocity_y", "spin_z"])
+        self.assertEqual([name for name in contacts if "_" in name], ["impulse_n", "impulse_t", "normal_x", "normal_y"])
+        np.testing.assert_array_equal(contacts["impulse_t"], run.contacts().impulse[:, 1])
+        np.testing.assert_array_equal(bodies["spin_z"], run.bodies().spin[:, 0])
+        self.assertEqual(" ".join(space), "impulse_n impulse_t impulse_s moment_n moment_t moment_s orientation_w orientation_x orientation_y orientation_z "
+                                          "spin_x spin_y spin_z edge_x edge_y edge_z")
+        self.assertEqual(" ".join(plane), "moment_z orientation origin corners_1x corners_1y corners_2x corners_2y stress_xx stress_xy stress_yx stress_yy")
+        self.assertEqual(list(forces), ["moment_x", "moment_y", "moment_z"])
+
     def test_tables_that_are_cut_off(self):
         """A last row without its end is left out, also where it has as many values; a row within that is short is an error."""
         for text, expected in (("a,b\n1,2\n3,4", [2.0]), ("a,b\n1,2\n3", [2.0]), ("a,b\n1,2\n3,4\n", [2.0, 4.0]), ("a,b\n", [])):

@@ -15,6 +15,10 @@ class ResultsError(Exception):
     """One line: what was found and what was expected."""
 
 
+#: columns whose only component, in the plane, is about z
+TURNS = ("spin", "moment")
+
+
 class Table(dict):
     """Columns by name, as keys and as attributes: arrays (rows) or (rows, components)."""
 
@@ -28,18 +32,23 @@ class Table(dict):
         return len(next(iter(self.values()))) if self.keys() else 0
 
     def frame(self):
-        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy."""
+        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner 1 NAME_1y. Impulses
+        and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""
         import pandas
 
         columns = {}
         for name, values in self.items():
-            if values.ndim == 1:
-                columns[name] = values
-            elif values.ndim == 3:
-                columns.update({f"{name}_{'xyz'[j]}{'xyz'[k]}": values[:, j, k] for j in range(values.shape[1]) for k in range(values.shape[2])})
-            else:
-                columns.update({f"{name}_{'xyz'[k]}": values[:, k] for k in range(values.shape[1])})
+            parts = values.reshape(len(values), int(np.prod(values.shape[1:])))
+            columns.update({name + ending: part for ending, part in zip(self._endings(name, values.shape[1:]), parts.T)})
         return pandas.DataFrame(columns)
+
+    def _endings(self, name, shape):
+        """What the components of a column of this shape have behind its name."""
+        if shape in ((), (1,)):
+            return ["_z" if name in TURNS else ""]
+        axes = "nts" if name in ("impulse", "moment") and "impulse" in self else "wxyz" if shape == (4,) else "xyz"
+        rows = [""] if len(shape) == 1 else "123" if name == "corners" else axes
+        return [f"_{row}{axis}" for row in rows[:shape[0] if len(shape) > 1 else 1] for axis in axes[:shape[-1]]]
 
 
 @contextmanager
