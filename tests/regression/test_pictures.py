@@ -174,6 +174,9 @@ class Pictures(RunTestCase):
         self.assertEqual(how["norm"].vmin, -how["norm"].vmax)
         with self.assertRaisesRegex(PictureError, "a scene of the plane has no velocity_z; expected velocity_x or velocity_y"):
             packing_picture.colours(self.disks, 150, bodies, "velocity_z")
+        for keys, names in (({"grid": [2, 2]}, "1234"), ({"subdomains": 3}, "123"), ({}, "12")):
+            run = types.SimpleNamespace(dimension=2, case={"decomposition": [keys]}, subdomain=lambda step: np.array([1, 2]))
+            self.assertEqual("".join(packing_picture.kinds(run, 0, bodies, "subdomain")[1]), names, "a subdomain without a body has its colour")
         figure = packing_picture.draw_packing(self.disks, None, self.options(colour="material"))
         figure.canvas.draw()
         bar = figure.axes[0].child_axes[0]
@@ -223,6 +226,9 @@ class Pictures(RunTestCase):
         bodies, walls = self.cylinder.bodies(), picture_space.Walls(self.cylinder, 1)
         low, high = picture_space.box_around(bodies, walls)
         np.testing.assert_allclose([low, high], [[-0.1, 0.0, -0.1], [0.1, 0.06, 0.1]], atol=1e-12)
+        # balls around bodies with shapes reach through the planes, and do not move the faces of the box away from them
+        wide = gravier.Table({**bodies, "radius": np.full(2, 0.05)})
+        np.testing.assert_allclose([one[1] for one in picture_space.box_around(wide, walls)], [0.0, 0.06], atol=1e-12)
         figure = packing_picture.draw_packing(self.cylinder, None, self.options())
         axes = figure.axes[0]
         view = picture_space.View(3, -60.0, 20.0)
@@ -265,6 +271,14 @@ class Pictures(RunTestCase):
         for text in figure.axes[0].texts:
             place = np.array([text.xy, text.xy])
             np.testing.assert_array_equal(place, np.clip(place, *np.transpose([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()])))
+        plt.close(figure)
+        # the start has no means: its bins are cut from the scene, whose lower end is the floor
+        figure = packing_picture.draw_packing(self.disks, 0, self.options(regions=True))
+        cuts = np.concatenate([segment for one in figure.axes[0].collections if hasattr(one, "get_segments") for segment in one.get_segments()
+                               if matplotlib.colors.to_hex(one.get_colors()[0]) == "#000000"])
+        bodies, floor = self.disks.bodies(0), self.disks.boundaries(0).position[:, 1].min()
+        for place in np.linspace(floor, (bodies.position[:, 1] + bodies.radius).max(), 5):
+            self.assertLess(np.abs(cuts[:, 1] - place).min(), 1e-9, place)
         plt.close(figure)
         case = {"insertion": [{"lower": [0.0, 1.0], "upper(1)": 2.0, "upper(2)": 3.0}, {"region": "ball", "centre": [5.0, 5.0], "region_radius": 1.0}]}
         np.testing.assert_array_equal(packing_picture.region_corners(case, 2), [[0, 1], [2, 3], [4, 4], [6, 6]])

@@ -241,6 +241,24 @@ class Package(RunTestCase):
         shapes = {matplotlib.image.imread(self.here("frames", name)).shape for name in os.listdir(self.here("frames"))}
         self.assertEqual(len(shapes), 1)
 
+    def test_directories_of_frames(self):
+        """Frames of a shorter movie are replaced. Those of a longer one, and a file that is no picture, are refused before anything is drawn."""
+        def held():
+            return {path.name: path.read_bytes() for path in pathlib.Path(self.here("film")).iterdir()}
+        for every, count in ((3, 2), (1, 4)):
+            self.assertEqual(self.plot("movie", "heap/results", "--out", "film", "--every", str(every)), (0, "film\n"))
+            self.assertEqual(sorted(held()), [f"frame_0000{k}.png" for k in range(count)])
+        before = held()
+        self.assertEqual(self.plot("movie", "heap/results", "--out", "film", "--every", "3"),
+                         (2, "gravier_plot: film: frame_00002.png to frame_00003.png of another movie, which this one of 2 frames would leave there; "
+                             "expected a directory without them\n"))
+        self.assertEqual(held(), before)
+        write(self.here("film/frame_00001.png"), "mine")
+        status, said = self.plot("movie", "heap/results", "--out", "film")
+        self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+        self.assertIn("film/frame_00001.png: there is a file of another kind or origin", said)
+        self.assertEqual(held(), {**before, "frame_00001.png": b"mine"})
+
     def test_colours_of_a_movie(self):
         """One value has one colour in all frames, also where a frame alone would have another unit."""
         run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True, regions=False)
@@ -324,12 +342,17 @@ class Package(RunTestCase):
                                    (("history", "heap/results", "--columns", "nothing"), "no column nothing"),
                                    (("convergence", "heap/results", "--step", "999"), "no step 999"),
                                    (("movie", "heap/results", "--out", "x.avi"), "x.avi: expected a movie .gif or .mp4"),
+                                   (("packing", "heap/results", "--size", "900"), "--size 900: 180000 dots at 200 an inch; expected 20000 at most"),
+                                   (("movie", "heap/results", "--size", "900"), "--size 900: 90000 dots at 100 an inch; expected 20000 at most"),
                                    (("movie", "heap/results", "--every", "0"), "--every 0 --fps 10: expected 1 or more"),
                                    (("movie", "heap/results", "--out", "heap/case.nml/film.gif", "--every", "3"),
                                     "heap/case.nml/film.gif: File exists; expected a place for files")):
             status, said = self.plot(*arguments)
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(message, said)
+        with unittest.mock.patch.object(gravier_plot, "draw_packing", side_effect=MemoryError("std::bad_alloc")):
+            self.assertEqual(self.plot("packing", "heap/results", "--out", "x.png"),
+                             (2, "gravier_plot: there is not enough memory for this picture; expected a smaller one, or fewer bodies\n"))
 
 
 if __name__ == "__main__":
