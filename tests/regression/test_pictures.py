@@ -308,6 +308,8 @@ class Pictures(RunTestCase):
                                      (None, ["speed"], "no column speed of a profile; expected one of solid_fraction")):
             with self.assertRaisesRegex(PictureError, words):
                 curve_pictures.draw_profile(self.disks, name, None, columns, False)
+        with self.assertRaisesRegex(gravier.ResultsError, "no region layers/stress in step 150; expected one of layers, middle$"):
+            self.disks.region("layers/stress")
         with self.assertRaisesRegex(PictureError, "no single region has bins; expected one of none, the case has none"):
             curve_pictures.draw_profile(self.cylinder, None, None, ["pressure"], False)
 
@@ -322,7 +324,7 @@ class Pictures(RunTestCase):
 
     def test_components_of_profiles(self):
         """The shear stresses are those across the axis of the bins; a component is a column of its own, with its unit."""
-        rows = gravier.results.Table(stress=np.arange(27.0).reshape(3, 3, 3), velocity=np.ones((3, 3)), solid_fraction=np.array([0.5, 0.5, 0.0]))
+        rows = gravier.Table(stress=np.arange(27.0).reshape(3, 3, 3), velocity=np.ones((3, 3)), solid_fraction=np.array([0.5, 0.5, 0.0]))
         for axis, names in enumerate((["xy", "xz"], ["xy", "yz"], ["xz", "yz"])):
             found = curve_pictures.components(rows, "stress", 3, axis)
             self.assertEqual(list(found), ["xx", "yy", "zz", *names])
