@@ -73,6 +73,10 @@ class RunLog:
             found = re.search(r"\bafter (?:step )?(\d+)", said)
             if found:
                 return int(found[1])
+        # a step that diverges is not kept, and is the last one
+        diverged = next((re.search(r"\*\*\* DIVERGED: step (\d+)", line) for line in self.lines if "*** DIVERGED: step " in line), None)
+        if diverged:
+            return int(diverged[1]) - 1
         return steps if word == "finished" else None
 
     def status(self):

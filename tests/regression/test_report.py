@@ -344,6 +344,7 @@ class Report(RunTestCase):
             self.assertIn("not all of its files are there and whole", page.text["headline"])
         for text, step in (("finished    all 9 steps reached the accuracy", 9), ("ended       after step 5 of 9: a plane\nfinished    all 5 steps reached", 5),
                            ("at rest     after step 6 of 9: x\nfinished    *** 1 of the steps did NOT", 6), ("interrupted *** by SIGTERM after step 3 of 9", 3),
+                           ("  *** DIVERGED: step 4 after 10 iterations of nlgs\nfinished    *** 3 of the steps did NOT", 3),
                            ("finished    no step was left to make after step 9", 9), ("lost        *** files of this run", None), ("       3   1.0E-3", None)):
             self.assertEqual(RunLog(text + "\n").last_step(9), step, text)
 
