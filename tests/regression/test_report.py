@@ -296,6 +296,10 @@ class Report(RunTestCase):
         page = self.page_of(place)
         self.assertIn("its attribute checksum is not that of what it holds", page.text["pictures"])
         self.assertIn("its attribute checksum", self.answer(page, "Are its files")[2])
+        with h5py.File(os.path.join(place, "results.h5"), "r+") as file:
+            del file["steps/120/bodies/position"], file["steps/120/bodies/id"]
+            file["steps/120/bodies/position"], file["steps/120/bodies/id"] = np.ones((36, 2)), np.ones(36, int)
+        self.assertIn("bodies whose ids do not ascend", self.page_of(place).text["pictures"])
         with open(os.path.join(place, "results.h5"), "wb") as file:
             file.write(b"nothing")
         page = self.page_of(place)
