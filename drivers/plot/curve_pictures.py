@@ -12,7 +12,7 @@ from picture_style import PictureError, scaled
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
 STYLES = ["-", "--", ":", "-."]
-UNITS = [(r"kinetic_|potential_energy|_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"wall_seconds|solve_seconds", "s"),
+UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass", "kg"),
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s")]
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
@@ -210,36 +210,51 @@ def region_with_bins(run, name, step):
 OF_GRAINS = {"velocity": "solid_fraction", "granular_temperature": "solid_fraction", "contacts_per_grain": "grains"}
 
 
-def components(rows, column, dimension):
-    """Curves of a column over the bins: {name: values (bins)}, nan where a bin has no grains whose mean it would be."""
+def parts_of(dimension):
+    """Components that are columns of their own: {name: (column, indices)}."""
+    axes = range(dimension)
+    return {**{f"velocity_{'xyz'[a]}": ("velocity", (a,)) for a in axes},
+            **{f"stress_{'xyz'[a]}{'xyz'[b]}": ("stress", (a, b)) for a in axes for b in axes}}
+
+
+def components(rows, column, dimension, axis):
+    """Curves of a column over the bins: {name: values (bins)}, nan where a bin has no grains whose mean it would be. Of the stress these are the
+    normal components and those that shear layers across the axis of the bins."""
+    column, chosen = parts_of(dimension).get(column, (column, None))
+    values = rows[column]
     if column in OF_GRAINS:
         there = rows[OF_GRAINS[column]] > 0.0
-        values = numpy.where(there[:, None] if rows[column].ndim == 2 else there, rows[column], numpy.nan)
-        return {"xyz"[a]: values[:, a] for a in range(dimension)} if column == "velocity" else {None: values}
+        values = numpy.where(there[:, None] if values.ndim == 2 else there, values, numpy.nan)
+    if values.ndim == 1:
+        return {None: values}
+    if chosen:
+        return {None: values[(slice(None), *chosen)]}
+    shown = [(a,) for a in range(dimension)]
     if column == "stress":
-        pairs = [(a, a) for a in range(dimension)] + [(0, dimension - 1)]
-        return {"xyz"[a] + "xyz"[b]: rows.stress[:, a, b] for a, b in pairs}
-    return {None: rows[column]}
+        shown = [(a, a) for a in range(dimension)] + [(min(a, axis), max(a, axis)) for a in range(dimension) if a != axis]
+    return {"".join("xyz"[a] for a in part): values[(slice(None), *part)] for part in shown}
 
 
 def draw_profile(run, name, steps, columns, mean):
     """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. A
     position along the height of the scene is drawn upwards."""
+    known = [*PROFILES, *parts_of(run.dimension)]
     for column in columns:
-        if column not in PROFILES:
-            raise PictureError(f"no column {column} of a profile; expected one of {', '.join(PROFILES)}")
-    steps = [step for step in run.steps if step > 0] if steps == "all" else [run.find_step(step) for step in steps or [None]]
+        if column not in known:
+            raise PictureError(f"no column {column} of a profile; expected one of {', '.join(known)}")
+    steps = [step for step in run.steps if step > 0] if steps == "all" else sorted({run.find_step(step) for step in steps or [None]})
     if not steps:
         raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
     name, axis = region_with_bins(run, name, steps[-1])
     tables = [run.region(name, step) for step in steps]
+    bar = ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), TIMES)
     upright = axis == run.dimension - 1
     figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
                                   figsize=(0.9 + 2.3 * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
                                   sharex=not upright, sharey=upright)
     places = places.ravel()
     for axes, column in zip(places, columns):
-        draw_column(axes, run, tables, column, axis, mean)
+        draw_column(axes, run, tables, column, axis, None if mean or len(steps) == 1 else bar.to_rgba([run.time(step) for step in steps]))
         grid(axes)
         legend_above(axes, columns=4)
     (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
@@ -247,8 +262,7 @@ def draw_profile(run, name, steps, columns, mean):
                                                f", t = {run.time(steps[0]):.4g} s")
     figure.suptitle(what, fontsize=9, x=0.01, ha="left")
     if len(steps) > 1 and not mean:
-        figure.colorbar(ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), TIMES), ax=list(places), label="time [s]",
-                        aspect=35)
+        figure.colorbar(bar, ax=list(places), label="time [s]", aspect=35)
     return figure
 
 
@@ -259,17 +273,17 @@ def mean_of(rows):
     return numpy.where(count > 0, numpy.nansum(rows, axis=0) / numpy.maximum(count, 1), numpy.nan)
 
 
-def draw_column(axes, run, tables, column, axis, mean):
-    """Curves of a column: a colour a component where there is one state, else a colour a state and a dash a component."""
+def draw_column(axes, run, tables, column, axis, shades):
+    """Curves of a column: with `shades` a colour a state and a dash a component, else the mean over the states with a colour a component."""
     upright = axis == run.dimension - 1
-    rows = [components(table, column, run.dimension) for table in tables]
+    rows = [components(table, column, run.dimension, axis) for table in tables]
     centres = [table.centre[:, axis] for table in tables]
-    if mean:
+    if shades is None:
         rows = [{key: mean_of([row[key] for row in rows]) for key in rows[0]}]
         centres = [numpy.mean(centres, axis=0)]
     for k, (centre, row) in enumerate(zip(centres, rows)):
         for c, (key, values) in enumerate(row.items()):
-            colour = LINES[c % len(LINES)] if len(rows) == 1 else TIMES(k / (len(rows) - 1))
+            colour = LINES[c % len(LINES)] if shades is None else shades[k]
             x, y = (values, centre) if upright else (centre, values)
             axes.plot(x, y, STYLES[c % len(STYLES)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
     shown = numpy.concatenate([values for row in rows for values in row.values()])

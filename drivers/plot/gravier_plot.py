@@ -22,6 +22,10 @@ from picture_style import PictureError
 from whole_file import PICTURES, claim, save_figure
 
 
+#: along the longer side of a picture in dots: its memory is the square of them
+MOST_DOTS = 20000
+
+
 def refuse(message):
     """One line, and the status of bad input."""
     print(f"gravier_plot: {message}", file=sys.stderr)
@@ -83,6 +87,10 @@ def check(options):
         refuse(f"--size {options.size:g} --view {options.view[0]:g} {options.view[1]:g}: expected a size above 0, 1000 at most, and two numbers")
     if options.kind == "packing" and not 1 <= options.dpi <= 10000:
         refuse(f"--dpi {options.dpi}: expected 1 to 10000")
+    if options.kind == "movie" or (options.kind == "packing" and (options.out is None or options.out.suffix != ".svg")):
+        dpi = options.dpi if options.kind == "packing" else 100
+        if options.size * dpi > MOST_DOTS:
+            refuse(f"--size {options.size:g}: {options.size * dpi:.0f} dots at {dpi} an inch; expected {MOST_DOTS} at most")
 
 
 def draw(options):
@@ -119,6 +127,8 @@ def main(arguments=None):
         draw(options)
     except (gravier.ResultsError, PictureError) as reason:
         refuse(reason)
+    except MemoryError:
+        refuse("there is not enough memory for this picture; expected a smaller one, or fewer bodies")
 
 
 if __name__ == "__main__":

@@ -8,11 +8,11 @@ import matplotlib.animation
 import matplotlib.pyplot as plt
 from packing_picture import draw_packing, shared_frame
 from picture_style import PictureError
-from whole_file import MOVIES, claim, save_figure, written
+from whole_file import MOVIES, PICTURES, claim, give_names, save_figure, written
 
 
 def draw_movie(run, options):
-    """A movie (.gif, .mp4) or, for any other path, a directory of frames."""
+    """A movie (.gif, .mp4) or, for any other path, a directory of frames, which get their names when all of them are there."""
     out = options.out or run.directory / "movie.gif"
     if out.suffix == ".mp4" and shutil.which("ffmpeg") is None:
         raise PictureError(f"{out}: no program ffmpeg; expected a movie .gif, or a directory for frames")
@@ -21,22 +21,38 @@ def draw_movie(run, options):
     movie = out.suffix in MOVIES
     if movie:
         claim(out, MOVIES)
+    steps = [step for step in run.steps if len(run.bodies(step)) > 0][::options.every]
+    names = [f"frame_{k:05d}.png" for k in range(len(steps))]
+    if not movie:
+        check_frames(out, names)
+    frame = shared_frame(run, steps, options)
     try:
         (out.parent if movie else out).mkdir(parents=True, exist_ok=True)
+        scratch = tempfile.TemporaryDirectory(prefix=".frames-", dir=None if movie else out)
     except OSError as reason:
         raise PictureError(f"{out}: {reason.strerror}; expected a place for files") from None
-    steps = [step for step in run.steps if len(run.bodies(step)) > 0][::options.every]
-    frame = shared_frame(run, steps, options)
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch) if movie else out
-        for k, step in enumerate(steps):
+    with scratch as folder:
+        paths = [Path(folder) / name for name in names]
+        for path, step in zip(paths, steps):
             figure = draw_packing(run, step, options, frame)
             # frames of one size
-            save_figure(figure, folder / f"frame_{k:05d}.png", dpi=100, metadata={"Software": None})
+            save_figure(figure, path, dpi=100, metadata={"Software": None})
             plt.close(figure)
         if movie:
-            join_frames(sorted(folder.glob("frame_*.png")), out, options.fps)
+            join_frames(paths, out, options.fps)
+        else:
+            give_names({out / path.name: path for path in paths})
     print(out)
+
+
+def check_frames(folder, names):
+    """Refuse a directory in which a frame would replace a file that is no picture, or in which frames of a longer movie would stay."""
+    for name in names:
+        claim(folder / name, PICTURES)
+    others = sorted(path.name for path in folder.glob("frame_[0-9]*.png") if path.name not in names)
+    if others:
+        raise PictureError(f"{folder}: {others[0]}{f' to {others[-1]}' if len(others) > 1 else ''} of another movie, which this one of {len(names)} frames "
+                           "would leave there; expected a directory without them")
 
 
 def join_frames(paths, out, fps):

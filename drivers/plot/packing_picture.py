@@ -55,8 +55,10 @@ def spread(values, kind):
 def kinds(run, step, bodies, kind):
     """Numbers to colour bodies by, from 1, and the names of all of them."""
     if kind == "subdomain":
-        values = run.subdomain(step)
-        return values, [str(number) for number in range(1, values.max() + 1)]
+        values, asked = run.subdomain(step), run.case.get("decomposition", [{}])[0]
+        # a subdomain without a body has its colour, too
+        count = int(asked.get("subdomains", numpy.prod(gravier.entries(asked, "grid", numpy.ones(run.dimension)))))
+        return values, [str(number) for number in range(1, max(count, values.max()) + 1)]
     if "material" not in bodies:
         raise PictureError(f"{run.path}: no materials; expected another --colour")
     values = bodies.material.astype(int)
@@ -234,7 +236,7 @@ def draw_packing(run, step, options, frame=None):
         draw_space(axes, view, walls, *box)
         axes.set_axis_off()
     if options.regions:
-        draw_regions(axes, run, step, view, *box)
+        draw_regions(axes, run, step, view, *box_around(bodies, walls))
     axes.set_title(title_of(run, step, bodies, contacts, view.flat), fontsize=9, loc="left", pad=18 if options.chains else 6)
     if values is not None:
         add_legend(figure, axes, values, label, how, kinds(run, step, bodies, options.colour)[1] if options.colour in KINDS else None)

@@ -36,16 +36,29 @@ def ball_lines(centre, radius):
     return rings
 
 
+def bins_of(keys, low, high):
+    """Corners of the bins of a region, of equal width along its axis; of one without bins its own."""
+    count, axis = (int(keys["bins"]), "xyz".index(keys["axis"])) if "bins" in keys and "axis" in keys else (1, 0)
+    ends = numpy.linspace(low[axis], high[axis], count + 1)
+    boxes = []
+    for first, last in zip(ends[:-1], ends[1:]):
+        boxes.append((low.copy(), high.copy()))
+        boxes[-1][0][axis], boxes[-1][1][axis] = first, last
+    return boxes
+
+
 def draw_regions(axes, run, step, view, low, high):
-    """Outlines of the regions of a run: those of means with their bins as they are in this step, those in which grains enter."""
+    """Outlines of the regions of a run: those of means with their bins as they are in this step, those in which grains enter. `low` and `high` are
+    the ends of a scene that is not periodic. There end those without a side that no means tell of."""
     dimension = len(low)
+    low, high = numpy.where(run.period > 0.0, run.origin, low), numpy.where(run.period > 0.0, run.origin + run.period, high)
     for keys in run.case.get("region", []):
         name = keys.get("name", "")
         if name in run.regions(step):
             rows = run.region(name, step)
             boxes = list(zip(rows.lower, rows.upper))
         else:
-            boxes = [corners_of(keys, low, high)]
+            boxes = bins_of(keys, *corners_of(keys, low, high))
         for first, last in boxes if len(boxes) > 1 else []:
             draw_lines(axes, view, box_lines(first, last), MEANS, ":")
         first, last = boxes[0][0], boxes[-1][1]

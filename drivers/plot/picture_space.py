@@ -9,6 +9,8 @@ import gravier
 
 #: angles of the points of a circle
 ARC = numpy.linspace(0.0, 2.0 * numpy.pi, 97)
+#: a normal whose component is above this lies along an axis
+ALONG = 0.999
 
 
 class View:
@@ -86,8 +88,15 @@ def box_corners(low, high):
 
 
 def box_around(bodies, walls, points=()):
-    """Corners of the box that holds the bodies, some points and the walls: of planes, which have no end, the points nearest to the middle."""
+    """Corners of the box that holds the bodies, some points and the walls: of planes, which have no end, the points nearest to the middle. Balls
+    around bodies with shapes reach through planes, which cut them off."""
     low, high = (bodies.position - bodies.radius[:, None]).min(axis=0), (bodies.position + bodies.radius[:, None]).max(axis=0)
+    for point, normal in zip(*walls.planes()):
+        a = numpy.argmax(numpy.abs(normal))
+        if normal[a] > ALONG:
+            low[a] = max(low[a], min(point[a], bodies.position[:, a].min()))
+        elif normal[a] < -ALONG:
+            high[a] = min(high[a], max(point[a], bodies.position[:, a].max()))
     parts = [*walls.polygons(), *walls.facets] + ([points] if len(points) > 0 else [])
     for point, axis, radius in walls.cylinders():
         reach = radius * numpy.sqrt(numpy.maximum(1.0 - axis**2, 0.0))
@@ -135,7 +144,7 @@ def draw_space(axes, view, walls, low, high):
     for points in walls.polygons():
         draw_wall(axes, view, points, numpy.dot(points.mean(axis=0) - middle, view.eye) > 0.0)
     for point, normal in zip(*walls.planes()):
-        if numpy.abs(normal).max() < 0.999:
+        if numpy.abs(normal).max() < ALONG:
             points = cut_box(point, normal, low, high)
             if len(points) >= 3:
                 draw_wall(axes, view, points, numpy.dot(normal, view.eye) < 0.0)
@@ -196,7 +205,7 @@ def draw_box(axes, view, walls, low, high):
         side = int(view.eye[a] < 0.0)
         corners = box_corners(low, high)
         face = corners[numpy.isclose(corners[:, a], ends[side][a], atol=1e-9 * size)][[0, 1, 3, 2]]
-        wall = numpy.any((normals[:, a] * (1 - 2 * side) > 0.999) & (numpy.abs(places[:, a] - ends[side][a]) < 0.02 * size))
+        wall = numpy.any((normals[:, a] * (1 - 2 * side) > ALONG) & (numpy.abs(places[:, a] - ends[side][a]) < 0.02 * size))
         axes.add_patch(plt.Polygon(view.place(face), closed=True, facecolor="0.94" if wall else "none", edgecolor="0.6", linewidth=0.6, zorder=0.2))
     numbered = []
     for a in range(3):

@@ -31,7 +31,7 @@ def is_default(key, value, default):
         return False
     try:
         meant = gravier.parse_namelist(f"&x {key} = {written[1]} /")["x"][0].get(key)
-    except (KeyError, IndexError, ValueError):
+    except (gravier.CaseError, KeyError, IndexError, ValueError):
         return False
     if isinstance(meant, list) and isinstance(value, list) and len(value) < len(meant):
         value = value + [meant[k] for k in range(len(value), len(meant))]

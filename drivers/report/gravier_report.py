@@ -48,6 +48,7 @@ class Folder:
         self.run = self._read(lambda: gravier.Run(self.directory), None)
         if self.run:
             self._read(self._read_states, None)
+        self._compare()
         last = max((self.directory / name).stat().st_mtime for name in names)
         self.written = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(last))
 
@@ -64,6 +65,16 @@ class Folder:
             self.run.bodies(step)
             self.run.boundaries(step)
             self.run.contacts(step)
+
+    def _compare(self):
+        """Note files that are of another run than the log: of one that has come to its end, they end with another step."""
+        word, _ = self.log.end()
+        last = self.log.last_step((self.options().get("time") or [{}])[0].get("steps"))
+        reached = {"history.csv": self.history.step[-1:] if len(self.history) > 0 else (), "results.h5": self.run.steps[-1:] if self.run else ()}
+        for name, steps in reached.items():
+            # the last state may not have been kept
+            if word == "finished" and last is not None and any(step > last or (name == "history.csv" and step < last) for step in steps):
+                self.notes.append(f"run.log ends with step {last}, {name} with step {int(steps[0])}: they are not of one run.")
 
     def groups(self):
         """The case by groups, or the keys in force where results.h5 does not have it."""

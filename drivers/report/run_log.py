@@ -66,6 +66,19 @@ class RunLog:
                 return word, line[len(word):].strip()
         return "", ""
 
+    def last_step(self, steps):
+        """The step with which a run has ended, of which its case asks for `steps`; None where the log has no last words, or they do not tell."""
+        word, text = self.end()
+        for said in (self.value("at rest"), self.value("ended"), text):
+            found = re.search(r"\bafter (?:step )?(\d+)", said)
+            if found:
+                return int(found[1])
+        # a step that diverges is not kept, and is the last one
+        diverged = next((re.search(r"\*\*\* DIVERGED: step (\d+)", line) for line in self.lines if "*** DIVERGED: step " in line), None)
+        if diverged:
+            return int(diverged[1]) - 1
+        return steps if word == "finished" else None
+
     def status(self):
         """The exit status that these words belong to; None of a run without an end."""
         word, text = self.end()

@@ -7,6 +7,8 @@ GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with mended overlaps, the part of the paths of grains below which
 #: shifts are small, the velocity error over U
 OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
+#: the question whose answer says nothing of the run
+FILES = "Are its files there and whole?"
 #: the parts of the energy turned over up to which a balance is one, and up to which it is nearly one
 BALANCED, UNBALANCED = 1e-4, 1e-2
 
@@ -29,7 +31,8 @@ def percent(share):
 
 
 def ended(log, history, steps):
-    made = f"{int(history.step[-1]) if len(history) > 0 else 0} of {steps if steps is not None else '?'} steps"
+    made = int(history.step[-1]) if len(history) > 0 else log.last_step(steps)
+    made = f"{'?' if made is None else made} of {'?' if steps is None else steps} steps"
     word, text = log.end()
     early = next((f"{begin} {log.value(begin)}" for begin in ("at rest", "ended") if log.value(begin)), None)
     if word == "finished":
@@ -52,11 +55,16 @@ def converged(log, history):
     return Answer(question, GOOD, f"Yes, all {len(history)} solves so far.")
 
 
-def accurate(history, solver):
+def accurate(log, history, solver):
     question = "Was the accuracy reached?"
     if "velocity_error" not in history or len(history) == 0:
-        return Answer(question, UNKNOWN, "Not known: no solve is recorded.")
-    ratio = error_ratio(history)
+        said = re.match(r"velocity error at most (\S+) of U", log.value("accuracy"))
+        if not said:
+            return Answer(question, UNKNOWN, "Not known: no solve is recorded.")
+        # the largest of the log stands for those of the steps
+        ratio = numpy.array([float(said[1])])
+    else:
+        ratio = error_ratio(history)
     if not numpy.isfinite(ratio).any():
         return Answer(question, UNKNOWN, "Not known: no step has an estimate of its velocity error.")
     worst = float(numpy.nanmax(ratio))
@@ -78,13 +86,15 @@ def mended(log, history):
     """As the log counts projections at its end, which leaves out those that shift by rounding, and weighs them by the paths of grains; of
     steps that it does not know, before its end or before a restart, as history.csv counts them."""
     question = "Was the geometry mended?"
-    if "projected" not in history or "max_overlap" not in history or len(history) == 0:
+    recorded = "projected" in history and "max_overlap" in history and len(history) > 0
+    if not recorded and not log.value("overlaps"):
         return Answer(question, UNKNOWN, "Not known: no step is recorded.")
-    overlap = f"The largest overlap was {history.max_overlap.max():.2g} m."
+    largest = f"{history.max_overlap.max():.2g} m" if recorded else log.value("overlaps")
+    overlap = f"The largest overlap was {largest}."
     lines = [line.strip() for line in log.lines]
     yielding = next((line for line in lines if line.startswith("compliant contacts are deformed")), None)
     if yielding:
-        overlap = f"The largest overlap of rigid contacts was {history.max_overlap.max():.2g} m; {yielding.split(';')[0]}."
+        overlap = f"The largest overlap of rigid contacts was {largest}; {yielding.split(';')[0]}."
     if "overlaps are not projected" in lines:
         return Answer(question, GOOD, f"No: overlaps are not projected in this case. {overlap}")
     told = next((line for line in lines if line.startswith("projected in ")), "")
@@ -98,7 +108,7 @@ def mended(log, history):
         grade = DOUBT if share > OFTEN else GOOD
     words = [told] if told else []
     # what came before the log: how far grains were shifted then is not known
-    before = history.projected[:max(0, len(history) - known)]
+    before = history.projected[:max(0, len(history) - known)] if recorded else numpy.zeros(0)
     if (before > 0).any():
         grade = BAD if grade == BAD else DOUBT
         part = percent(float((before > 0).mean()))
@@ -112,7 +122,7 @@ def mended(log, history):
 def last_part(log, history):
     """Steps since the last restart, which the log names by the step of its checkpoint; all of them without one."""
     found = re.match(r"from the checkpoint of step (\d+)", log.value("restart"))
-    return int((history.step > int(found[1])).sum()) if found else len(history)
+    return int((history.step > int(found[1])).sum()) if found and len(history) > 0 else len(history)
 
 
 def too_fast(history):
@@ -136,7 +146,7 @@ def balanced(log):
 
 
 def readable(notes):
-    return [Answer("Can its files be read?", BAD, f"Not all: {' '.join(notes)}")] if notes else []
+    return [Answer(FILES, BAD, f"Not all: {' '.join(notes)}")] if notes else []
 
 
 def error_ratio(history):
@@ -150,7 +160,7 @@ def answers(log, history, options, notes):
     """Answers to all questions of a run; `notes` name files that are missing or damaged."""
     solver = (options.get("solver") or [{}])[0]
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(history, solver), mended(log, history), *too_fast(history), *balanced(log),
+    return [ended(log, history, steps), converged(log, history), accurate(log, history, solver), mended(log, history), *too_fast(history), *balanced(log),
             *readable(notes)]
 
 
@@ -162,8 +172,10 @@ def headline(found, log):
         return (BAD if BAD in grades else DOUBT), "This run has not come to its end."
     if word != "finished":
         return BAD, "This run did not come to its end."
-    if BAD in grades:
+    if BAD in [answer.grade for answer in found if answer.question != FILES]:
         return BAD, "This run ended, but its results are not what was asked for."
+    if BAD in grades:
+        return BAD, "This run ended, but not all of its files are there and whole."
     if DOUBT in grades:
         return DOUBT, "This run ended; mind what is marked below."
     return GOOD, "This run converged, with the accuracy that was asked for."

@@ -104,7 +104,9 @@ class Axes(unittest.TestCase):
         for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
                                        ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
                                        ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
-                                       ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]")):
+                                       ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
+                                       ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
+                                       ("force_x:hard_work", 2, "force x:hard work [N]")):
             self.assertEqual(curve_pictures.label_of(name, dimension), label)
         for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):
             self.assertEqual(curve_pictures.label_of_all(name, [3, 2, 3]), label)
@@ -172,6 +174,9 @@ class Pictures(RunTestCase):
         self.assertEqual(how["norm"].vmin, -how["norm"].vmax)
         with self.assertRaisesRegex(PictureError, "a scene of the plane has no velocity_z; expected velocity_x or velocity_y"):
             packing_picture.colours(self.disks, 150, bodies, "velocity_z")
+        for keys, names in (({"grid": [2, 2]}, "1234"), ({"subdomains": 3}, "123"), ({}, "12")):
+            run = types.SimpleNamespace(dimension=2, case={"decomposition": [keys]}, subdomain=lambda step: np.array([1, 2]))
+            self.assertEqual("".join(packing_picture.kinds(run, 0, bodies, "subdomain")[1]), names, "a subdomain without a body has its colour")
         figure = packing_picture.draw_packing(self.disks, None, self.options(colour="material"))
         figure.canvas.draw()
         bar = figure.axes[0].child_axes[0]
@@ -221,6 +226,9 @@ class Pictures(RunTestCase):
         bodies, walls = self.cylinder.bodies(), picture_space.Walls(self.cylinder, 1)
         low, high = picture_space.box_around(bodies, walls)
         np.testing.assert_allclose([low, high], [[-0.1, 0.0, -0.1], [0.1, 0.06, 0.1]], atol=1e-12)
+        # balls around bodies with shapes reach through the planes, and do not move the faces of the box away from them
+        wide = gravier.Table({**bodies, "radius": np.full(2, 0.05)})
+        np.testing.assert_allclose([one[1] for one in picture_space.box_around(wide, walls)], [0.0, 0.06], atol=1e-12)
         figure = packing_picture.draw_packing(self.cylinder, None, self.options())
         axes = figure.axes[0]
         view = picture_space.View(3, -60.0, 20.0)
@@ -264,6 +272,14 @@ class Pictures(RunTestCase):
             place = np.array([text.xy, text.xy])
             np.testing.assert_array_equal(place, np.clip(place, *np.transpose([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()])))
         plt.close(figure)
+        # the start has no means: its bins are cut from the scene, whose lower end is the floor
+        figure = packing_picture.draw_packing(self.disks, 0, self.options(regions=True))
+        cuts = np.concatenate([segment for one in figure.axes[0].collections if hasattr(one, "get_segments") for segment in one.get_segments()
+                               if matplotlib.colors.to_hex(one.get_colors()[0]) == "#000000"])
+        bodies, floor = self.disks.bodies(0), self.disks.boundaries(0).position[:, 1].min()
+        for place in np.linspace(floor, (bodies.position[:, 1] + bodies.radius).max(), 5):
+            self.assertLess(np.abs(cuts[:, 1] - place).min(), 1e-9, place)
+        plt.close(figure)
         case = {"insertion": [{"lower": [0.0, 1.0], "upper(1)": 2.0, "upper(2)": 3.0}, {"region": "ball", "centre": [5.0, 5.0], "region_radius": 1.0}]}
         np.testing.assert_array_equal(packing_picture.region_corners(case, 2), [[0, 1], [2, 3], [4, 4], [6, 6]])
         np.testing.assert_array_equal(gravier.entries({"a(2:3)": [7, 8], "b": 1}, "a", [0, 0, 0]), [0, 7, 8])
@@ -292,6 +308,8 @@ class Pictures(RunTestCase):
                                      (None, ["speed"], "no column speed of a profile; expected one of solid_fraction")):
             with self.assertRaisesRegex(PictureError, words):
                 curve_pictures.draw_profile(self.disks, name, None, columns, False)
+        with self.assertRaisesRegex(gravier.ResultsError, "no region layers/stress in step 150; expected one of layers, middle$"):
+            self.disks.region("layers/stress")
         with self.assertRaisesRegex(PictureError, "no single region has bins; expected one of none, the case has none"):
             curve_pictures.draw_profile(self.cylinder, None, None, ["pressure"], False)
 
@@ -299,10 +317,39 @@ class Pictures(RunTestCase):
         """A bin without grains has no velocity: means leave it out, and curves have a gap."""
         def rows(fractions, speeds):
             return gravier.results.Table(solid_fraction=np.array(fractions), velocity=np.array([[0.0, speed] for speed in speeds]), grains=np.array(fractions))
-        found = [curve_pictures.components(row, "velocity", 2)["y"] for row in (rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), rows([0.5, 0.1, 0.0], [-2.0, -3.0, 0.0]))]
+        found = [curve_pictures.components(row, "velocity", 2, 1)["y"] for row in (rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), rows([0.5, 0.1, 0.0], [-2.0, -3.0, 0.0]))]
         np.testing.assert_array_equal(found[0], [-1.0, np.nan, np.nan])
         np.testing.assert_array_equal(curve_pictures.mean_of(found), [-1.5, -3.0, np.nan])
-        np.testing.assert_array_equal(curve_pictures.components(rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), "solid_fraction", 2)[None], [0.5, 0.0, 0.0])
+        np.testing.assert_array_equal(curve_pictures.components(rows([0.5, 0.0, 0.0], [-1.0, 0.0, 0.0]), "solid_fraction", 2, 1)[None], [0.5, 0.0, 0.0])
+
+    def test_components_of_profiles(self):
+        """The shear stresses are those across the axis of the bins; a component is a column of its own, with its unit."""
+        rows = gravier.Table(stress=np.arange(27.0).reshape(3, 3, 3), velocity=np.ones((3, 3)), solid_fraction=np.array([0.5, 0.5, 0.0]))
+        for axis, names in enumerate((["xy", "xz"], ["xy", "yz"], ["xz", "yz"])):
+            found = curve_pictures.components(rows, "stress", 3, axis)
+            self.assertEqual(list(found), ["xx", "yy", "zz", *names])
+            for name, values in found.items():
+                np.testing.assert_array_equal(values, rows.stress[:, "xyz".index(name[0]), "xyz".index(name[1])])
+        np.testing.assert_array_equal(curve_pictures.components(rows, "stress_yx", 3, 2)[None], rows.stress[:, 1, 0])
+        np.testing.assert_array_equal(curve_pictures.components(rows, "velocity_z", 3, 2)[None], [1.0, 1.0, np.nan])
+        figure = curve_pictures.draw_profile(self.disks, "layers", None, ["stress_xy", "velocity_x"], False)
+        self.assertEqual([axes.get_xlabel().split(" [")[0] for axes in figure.axes], ["stress xy", "velocity x"])
+        np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), self.disks.region("layers").stress[:, 0, 1])
+        plt.close(figure)
+        with self.assertRaisesRegex(PictureError, "no column stress_xz of a profile; expected one of .*velocity_y, stress_xx, stress_xy, stress_yx, stress_yy$"):
+            curve_pictures.draw_profile(self.disks, "layers", None, ["stress_xz"], False)
+
+    def test_colours_of_states(self):
+        """A state has the colour that the bar gives to its time, in whatever order and at whatever distances the steps are told."""
+        for steps in ([150, 50], [100, 50, 150], "all"):
+            figure = curve_pictures.draw_profile(self.disks, "layers", steps, ["pressure"], False)
+            panel, bar = figure.axes
+            shades = curve_pictures.TIMES((bar.get_ylim()[1] - np.array([0.05, 0.1, 0.15])) / -np.ptp(bar.get_ylim()) + 1.0)
+            for line in panel.lines:
+                step = next(step for step in (50, 100, 150) if np.array_equal(self.disks.region("layers", step).pressure, line.get_xdata()))
+                np.testing.assert_allclose(line.get_color(), shades[step // 50 - 1], atol=0.01, err_msg=f"{steps}: step {step}")
+            self.assertIn(f"step 50 to 150: {len(panel.lines)} states", figure._suptitle.get_text())
+            plt.close(figure)
 
     @unittest.skipUnless(VTK, "NO VTK: no python3 with vtk; set GRAVIER_VTK_PYTHON")
     def test_by_vtk(self):

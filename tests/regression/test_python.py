@@ -67,10 +67,16 @@ class Package(RunTestCase):
         for text, words in (("&scene a = 1, a = 2 /", "&scene a is given twice"), ("&a x(1) = 1, x = 2 /", "&a x is given twice"),
                             ("&a x(2) = 1, x(1:2) = 2, 3 /", "&a x(2) is given twice"), ("&a x = 1", "&a is not closed: expected /"),
                             ("&a x = 1 /\n y = 2", "'y =' outside a group"), ("&a 3 /", "'3' in &a: expected `key = value` or /"),
+                            ("&a x = (1,2) /", "'(' in &a: expected `key = value` or /"),
                             ("&a x = 1 &b y = 2 /", "'&b' in &a: expected `key = value` or /"), ("&a x(q) = 1 /", "&a x(q): expected an index as (2) or (2:3)")):
             with self.assertRaises(gravier.CaseError) as refused:
                 gravier.parse_namelist(text)
             self.assertEqual(str(refused.exception), words)
+        # texts that are repeated, and what Python alone takes for numbers
+        read = gravier.parse_namelist("&law materials = 2*'it''s', x = 2*\"\", y = 1_8, z = 1_0.5 /")
+        self.assertEqual(read, {"law": [{"materials": ["it's", "it's"], "x": ["", ""], "y": "1_8", "z": "1_0.5"}]})
+        with self.assertRaisesRegex(gravier.CaseError, r"^'a\\nb': expected a text on one line$"):
+            gravier.namelist({"scene": {"title": "a\nb"}})
 
     def test_command(self):
         done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "--help"], capture_output=True,
@@ -100,6 +106,24 @@ class Package(RunTestCase):
             run.bodies(7)
         with self.assertRaisesRegex(gravier.ResultsError, "expected the results of a run"):
             gravier.Run(self.here("nowhere"))
+
+    def test_frames(self):
+        """Components have the names of what they are along: axes, the normal and the tangents of a contact, the real part of a quaternion. A
+        dictionary stands in for a table of pandas."""
+        run, table = self.run_, gravier.Table
+        with unittest.mock.patch.dict(sys.modules, {"pandas": types.SimpleNamespace(DataFrame=dict)}):
+            bodies, contacts = run.bodies().frame(), run.contacts().frame()
+            space = table(impulse=np.ones((1, 3)), moment=np.ones((1, 3)), orientation=np.ones((1, 4)), spin=np.ones((1, 3)), edge=np.ones((1, 3)))
+            plane = table(moment=np.ones((0, 1)), orientation=np.ones((0, 1)), origin=np.ones((0, 1)), corners=np.ones((0, 2, 2)), stress=np.ones((0, 2, 2)))
+            space, plane, forces = space.frame(), plane.frame(), table(moment=np.ones((1, 3))).frame()
+        self.assertEqual([name for name in bodies if "_" in name], ["position_x", "position_y", "velocity_x", "velocity_y", "spin_z"])
+        self.assertEqual([name for name in contacts if "_" in name], ["impulse_n", "impulse_t", "normal_x", "normal_y"])
+        np.testing.assert_array_equal(contacts["impulse_t"], run.contacts().impulse[:, 1])
+        np.testing.assert_array_equal(bodies["spin_z"], run.bodies().spin[:, 0])
+        self.assertEqual(" ".join(space), "impulse_n impulse_t impulse_s moment_n moment_t moment_s orientation_w orientation_x orientation_y orientation_z "
+                                          "spin_x spin_y spin_z edge_x edge_y edge_z")
+        self.assertEqual(" ".join(plane), "moment_z orientation origin corners_1x corners_1y corners_2x corners_2y stress_xx stress_xy stress_yx stress_yy")
+        self.assertEqual(list(forces), ["moment_x", "moment_y", "moment_z"])
 
     def test_tables_that_are_cut_off(self):
         """A last row without its end is left out, also where it has as many values; a row within that is short is an error."""
@@ -151,8 +175,15 @@ class Package(RunTestCase):
             run = gravier.Run(place / "results")
             self.assertEqual((run.case["scene"][0]["friction"], run.steps[-1], status), (*point.values(), 0))
         self.assertEqual(base["scene"]["friction"], 0.3)
-        with self.assertRaisesRegex(gravier.CaseError, "ranks = 0: expected a whole number above 0"):
-            gravier.run(base, self.here("none"), ranks=0)
+        for ranks in (0, 1.5, math.nan, math.inf, "2", None):
+            with self.assertRaisesRegex(gravier.CaseError, f"ranks = {ranks}: expected a whole number above 0"):
+                gravier.run(base, self.here("none"), ranks=ranks)
+        for changes, words in (({("scene",): [0.1]}, r"\('scene',\): expected \(group, key\), or \(group, name, key\)"),
+                               ({"scene": [0.1]}, r"'scene': expected \(group, key\), or"),
+                               ({("scene", "friction"): 0.1}, r"\('scene', 'friction'\): 0.1; expected a list of values$"),
+                               ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$")):
+            with self.assertRaisesRegex(gravier.CaseError, words):
+                list(gravier.study(base, changes, self.here("none")))
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
             list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
         # one of several groups, by its name or its number
@@ -186,6 +217,24 @@ class Package(RunTestCase):
         self.assertEqual({file.name: file.read_bytes() for file in place.iterdir() if file.is_file()}, before)
         with self.assertRaisesRegex(gravier.CaseError, "case.nml: File exists; expected a place for a directory"):
             gravier.run(base, place / "case.nml")
+
+    def test_logs_of_others(self):
+        """A terminal.log of another origin is refused before anything is written; one of gravier.run is replaced, also of an earlier version."""
+        base, place = {**self.base, "time": {"step": 1e-3, "steps": 1}}, pathlib.Path(self.here("logs"))
+        place.mkdir()
+        for own in ("made by gravier.run\nx\n", "Gravier 0.1.0 (a)\n", "gravier: error: x\n", ""):
+            (place / "terminal.log").write_text(own)
+            self.assertEqual(gravier.run(base, place, ranks=1.0), 0)
+            self.assertRegex((place / "terminal.log").read_text(), r"^made by gravier\.run\nGravier \d")
+        (place / "case.nml").unlink()
+        (place / "terminal.log").write_text("my notes\n")
+        with self.assertRaisesRegex(gravier.CaseError, "logs/terminal.log: there is a file of another kind or origin, which is not replaced"):
+            gravier.run(base, place)
+        self.assertEqual(((place / "terminal.log").read_text(), (place / "case.nml").exists()), ("my notes\n", False))
+        # the first line is none of what a program has said
+        with unittest.mock.patch.dict(os.environ, {"MPIEXEC": shutil.which("false")}):
+            with self.assertRaisesRegex(gravier.CaseError, "gravier ended with status 1: $"):
+                gravier.run(base, self.here("silent"))
 
     def test_pictures(self):
         drawn = [("packing", "a.png", ("--dpi", "100")), ("packing", "b.svg", ("--colour", "pressure", "--step", "100")),
@@ -222,6 +271,24 @@ class Package(RunTestCase):
         self.assertEqual((status, sorted(os.listdir(self.here("frames")))), (0, ["frame_00000.png", "frame_00001.png"]))
         shapes = {matplotlib.image.imread(self.here("frames", name)).shape for name in os.listdir(self.here("frames"))}
         self.assertEqual(len(shapes), 1)
+
+    def test_directories_of_frames(self):
+        """Frames of a shorter movie are replaced. Those of a longer one, and a file that is no picture, are refused before anything is drawn."""
+        def held():
+            return {path.name: path.read_bytes() for path in pathlib.Path(self.here("film")).iterdir()}
+        for every, count in ((3, 2), (1, 4)):
+            self.assertEqual(self.plot("movie", "heap/results", "--out", "film", "--every", str(every)), (0, "film\n"))
+            self.assertEqual(sorted(held()), [f"frame_0000{k}.png" for k in range(count)])
+        before = held()
+        self.assertEqual(self.plot("movie", "heap/results", "--out", "film", "--every", "3"),
+                         (2, "gravier_plot: film: frame_00002.png to frame_00003.png of another movie, which this one of 2 frames would leave there; "
+                             "expected a directory without them\n"))
+        self.assertEqual(held(), before)
+        write(self.here("film/frame_00001.png"), "mine")
+        status, said = self.plot("movie", "heap/results", "--out", "film")
+        self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+        self.assertIn("film/frame_00001.png: there is a file of another kind or origin", said)
+        self.assertEqual(held(), {**before, "frame_00001.png": b"mine"})
 
     def test_colours_of_a_movie(self):
         """One value has one colour in all frames, also where a frame alone would have another unit."""
@@ -298,6 +365,40 @@ class Package(RunTestCase):
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(message, said)
 
+    def test_what_bodies_files_do_not_have(self):
+        """A bodies file goes into a directory that is made; what only a run has is NaN, or refused in one line."""
+        gravier.write_bodies(self.run_, self.here("deeper/below/state.h5"), 300)
+        state = gravier.BodiesFile(self.here("deeper/below/state.h5"))
+        self.assertEqual(list(state.bodies().id), list(self.run_.bodies().id))
+        self.assertTrue(np.isnan([state.velocity_error(), state.velocity_scale()]).all())
+        for use, words in ((state.history, "a bodies file has no history; expected the results of a run"), (state.trace, "has no trace; expected the"),
+                           (state.time_step, "a bodies file has no time step; expected the results of a run"),
+                           (lambda: gravier.write_bodies(self.run_, self.here("heap/case.nml/state.h5")), "state.h5: .*; expected"),
+                           (lambda: gravier.Run(None), "None: expected the path of a directory"), (lambda: gravier.BodiesFile(3), "3: expected the path of a")):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                use()
+
+    def test_files_changed_by_hand(self):
+        """What is not as a run writes it is one line."""
+        last = "steps/300/"
+        for name, values, words in (("bodies/velocity", np.full((36, 3), np.nan), "bodies/velocity: a value that is not a finite number"),
+                                    ("bodies/radius", -np.ones(36), "bodies/radius: -1; expected radii above 0"),
+                                    ("bodies/id", np.ones(36, int), "results.h5: bodies whose ids do not ascend, or a contact whose candidate"),
+                                    ("bodies/id", np.arange(100, 136), "results.h5: bodies whose ids do not ascend, or a contact whose candidate"),
+                                    ("/boundaries/name", np.arange(3), "/boundaries/name: numbers; expected texts"),
+                                    (None, "&scene friction = 0.3 /", "results.h5: its case has no time step; expected the results of a run")):
+            shutil.copytree(self.here("heap/results"), self.here("changed"), dirs_exist_ok=True)
+            with h5py.File(self.here("changed/results.h5"), "r+") as file:
+                if name:
+                    place = name if name.startswith("/") else last + name
+                    del file[place]
+                    file[place] = values
+                else:
+                    file["run"].attrs["input_text"] = values
+            status, said = self.plot("packing", "changed", "--dpi", "50")
+            self.assertEqual((status, len(said.splitlines())), (2, 1), said)
+            self.assertIn(words, said)
+
     def test_refusals(self):
         for arguments, message in ((("packing", "nowhere"), "results.h5: no such file; expected the results of a run"),
                                    (("packing", "heap/results", "--step", "5"), "no step 5; expected one of 0, 100"),
@@ -306,12 +407,17 @@ class Package(RunTestCase):
                                    (("history", "heap/results", "--columns", "nothing"), "no column nothing"),
                                    (("convergence", "heap/results", "--step", "999"), "no step 999"),
                                    (("movie", "heap/results", "--out", "x.avi"), "x.avi: expected a movie .gif or .mp4"),
+                                   (("packing", "heap/results", "--size", "900"), "--size 900: 180000 dots at 200 an inch; expected 20000 at most"),
+                                   (("movie", "heap/results", "--size", "900"), "--size 900: 90000 dots at 100 an inch; expected 20000 at most"),
                                    (("movie", "heap/results", "--every", "0"), "--every 0 --fps 10: expected 1 or more"),
                                    (("movie", "heap/results", "--out", "heap/case.nml/film.gif", "--every", "3"),
                                     "heap/case.nml/film.gif: File exists; expected a place for files")):
             status, said = self.plot(*arguments)
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(message, said)
+        with unittest.mock.patch.object(gravier_plot, "draw_packing", side_effect=MemoryError("std::bad_alloc")):
+            self.assertEqual(self.plot("packing", "heap/results", "--out", "x.png"),
+                             (2, "gravier_plot: there is not enough memory for this picture; expected a smaller one, or fewer bodies\n"))
 
 
 if __name__ == "__main__":

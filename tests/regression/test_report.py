@@ -295,7 +295,11 @@ class Report(RunTestCase):
             file["steps/120/bodies/position"][0, 0] += 1.0
         page = self.page_of(place)
         self.assertIn("its attribute checksum is not that of what it holds", page.text["pictures"])
-        self.assertIn("its attribute checksum", self.answer(page, "Can its files")[2])
+        self.assertIn("its attribute checksum", self.answer(page, "Are its files")[2])
+        with h5py.File(os.path.join(place, "results.h5"), "r+") as file:
+            del file["steps/120/bodies/position"], file["steps/120/bodies/id"]
+            file["steps/120/bodies/position"], file["steps/120/bodies/id"] = np.ones((36, 2)), np.ones(36, int)
+        self.assertIn("bodies whose ids do not ascend", self.page_of(place).text["pictures"])
         with open(os.path.join(place, "results.h5"), "wb") as file:
             file.write(b"nothing")
         page = self.page_of(place)
@@ -303,6 +307,8 @@ class Report(RunTestCase):
         self.assertIn("There is no results.h5", page.text["pictures"])
         self.assertEqual(page.attributes["headline"]["data-grade"], "bad")
         self.assertEqual(self.answer(page, "Did every solve")[0], "✓")
+        self.assertIn("This run ended, but not all of its files are there and whole.", page.text["headline"])
+        self.assertEqual(self.answer(page, "Did it come")[2], "Yes: 120 of 120 steps.")
         os.makedirs(self.here("empty"))
         for arguments, words in (((self.here("empty"),), "no run.log, history.csv or results.h5; expected the output directory of a run"),
                                  ((self.here("nowhere"),), "no run.log, history.csv or results.h5; expected the output directory of a run"),
@@ -311,6 +317,40 @@ class Report(RunTestCase):
             status, said = self.report(*arguments)
             self.assertEqual((status, len(said.splitlines())), (2, 1), said)
             self.assertIn(words, said)
+
+    def test_without_a_history(self):
+        """What the last words know is told of a run whose history is missing; the headline says so, and does not condemn the run."""
+        place = self.here("bare")
+        shutil.copytree(self.here("good/results"), place)
+        os.remove(os.path.join(place, "history.csv"))
+        page = self.page_of(place)
+        self.assertIn("This run ended, but not all of its files are there and whole.", page.text["headline"])
+        self.assertEqual([row[0] for row in page.rows["answers"]], ["✓"] * 5 + ["✗"])
+        self.assertEqual(self.answer(page, "Did it come")[2], "Yes: 120 of 120 steps.")
+        history = gravier.Run(self.here("good/results")).history()
+        worst = (history.velocity_error / history.velocity_scale).max()
+        self.assertIn(f"at most {worst:.2g} of U", self.answer(page, "Was the accuracy")[2])
+        self.assertRegex(self.answer(page, "Was the geometry")[2], "The largest overlap was in the first step at most .* of the mean radius")
+        self.assertRegex(self.answer(page, "Are its files")[2], r"^Not all: \S+history.csv: No such file or directory; ")
+
+    def test_files_of_two_runs(self):
+        """A log that ends with another step than the tables is of another run."""
+        place = self.here("two")
+        shutil.copytree(self.here("good/results"), place)
+        with open(self.here("good/results/run.log"), encoding="utf-8") as file:
+            said = file.read()
+        for last, names in (("100", ("history.csv", "results.h5")), ("130", ("history.csv",))):
+            with open(os.path.join(place, "run.log"), "w", encoding="utf-8") as file:
+                file.write(said.replace("    steps = 120\n", f"    steps = {last}\n"))
+            page = self.page_of(place)
+            self.assertEqual(self.answer(page, "Are its files")[2], "Not all: " + " ".join(
+                f"run.log ends with step {last}, {name} with step 120: they are not of one run." for name in names))
+            self.assertIn("not all of its files are there and whole", page.text["headline"])
+        for text, step in (("finished    all 9 steps reached the accuracy", 9), ("ended       after step 5 of 9: a plane\nfinished    all 5 steps reached", 5),
+                           ("at rest     after step 6 of 9: x\nfinished    *** 1 of the steps did NOT", 6), ("interrupted *** by SIGTERM after step 3 of 9", 3),
+                           ("  *** DIVERGED: step 4 after 10 iterations of nlgs\nfinished    *** 3 of the steps did NOT", 3),
+                           ("finished    no step was left to make after step 9", 9), ("lost        *** files of this run", None), ("       3   1.0E-3", None)):
+            self.assertEqual(RunLog(text + "\n").last_step(9), step, text)
 
     def browse(self, *arguments):
         done = subprocess.run([BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--virtual-time-budget=20000",

@@ -15,7 +15,15 @@ REFUSED = [
     ("s.boundaries['roof']", "boundary 'roof': no boundary has this name; expected one of "),
     ("s.bodies.force = np.zeros((len(s.bodies), 2))",
      "force: this run has no applied forces; expected a simulation that was opened with them"),
-    ("s.bodies.velocity = np.zeros((3, 2))", "velocity: an array of shape (3, 2); expected a row for each of the 48 bodies of this rank"),
+    ("s.bodies.velocity = np.zeros((3, 2))", "velocity: an array of shape (3, 2); expected (48, 2), a row for each body of this rank"),
+    ("s.bodies.velocity = np.zeros((48, 3))", "velocity: an array of shape (48, 3); expected (48, 2), a row for each body of this rank"),
+    ("s.bodies.spin = np.zeros(48)", "spin: an array of shape (48,); expected (48, 1), a row for each body of this rank"),
+    ("s.bodies.velocity = np.ma.masked_all((48, 2))", "velocity: a masked array; expected numbers for all entries"),
+    ("s.bodies.velocity = np.zeros((48, 2), 'datetime64[s]')", "velocity: expected numbers"),
+    ("s.bodies.velocity = np.full((48, 2), '1')", "velocity: expected numbers"),
+    ("s.bodies.velocity = np.full((48, 2), '1', object)", "velocity: expected numbers"),
+    ("s.gravity = (0.0, np.timedelta64(1, 's'))", "gravity: expected numbers"),
+    ("gravier.Simulation(None)", "None: expected the path of an input file"),
     ("s.subdomains[0].velocity = np.zeros((len(s.subdomains[0]), 3))", "velocity: an array of shape ("),
     ("s.bodies.velocity = np.full((len(s.bodies), 2), np.nan)",
      "velocity of body 1: not a number to reckon with; expected a number of at most 1e30 in size"),
@@ -74,7 +82,8 @@ REFUSED = [
     ("s.remove([1, 1])", "remove: body 1: removed twice; expected each identifier once"),
     ("s.remove(np.array([2**63], dtype=np.uint64))", "remove: body 9223372036854775808: no free body of the scene; expected an identifier of one"),
     ("s.remove([1.5])", "remove: expected identifiers, which are whole numbers"),
-    ("gravier.Simulation('case.nml')", "open: a simulation is open in this process; expected that it is closed before"),
+    ("gravier.Simulation('case.nml')", "open: a simulation is open in this process; expected that it is closed before, by "
+     "gravier.Simulation.opened().close() if it is lost"),
 ]
 #: the same of a run that is over
 OVER = [("s.step()", "step: the run is over after step 60; expected a run that goes on"),
@@ -268,6 +277,31 @@ except gravier.SimulationError as error:
         with open(self.here("again", "bad.nml"), "w", encoding="ascii") as file:
             file.write("&scene bodies = 'lattice', lattice_count = 2, 2, radius_min = 1.0, radius_max = 1.0 /\n&time step = -1.0, steps = 1 /\n")
         self.play("again", HEAP, script)
+
+    def test_a_simulation_that_is_lost(self):
+        """One that no name holds any more can be reached, and closed."""
+        self.play("lost", HEAP, """
+assert gravier.Simulation.opened() is None
+s = gravier.Simulation(case, quiet=True)
+s.step()
+del s
+try:
+    gravier.Simulation(case)
+except gravier.SimulationError as error:
+    assert error.status == 2
+else:
+    raise AssertionError("not refused")
+assert gravier.Simulation.opened().made == 1
+gravier.Simulation.opened().close()
+with gravier.Simulation(case, quiet=True) as s:
+    assert gravier.Simulation.opened() is s
+    s.step()
+assert gravier.Simulation.opened() is None
+try:
+    gravier.Simulation("absent.nml")
+except gravier.SimulationError:
+    assert gravier.Simulation.opened() is None
+""")
 
     def test_exceptions_of_the_loop(self):
         """On one rank the run is ended as by stop; on several all ranks end, for the others would wait for ever."""

@@ -10,9 +10,10 @@ from . import blocks
 from .case import CaseError, entries, namelist, parse_namelist, run, study, value_text
 from .checksum import seal
 from .restarts import write_bodies
-from .results import BodiesFile, ResultsError, Run, Table, read_table
+from .results import BodiesFile, Run
 from .shapes import Piece, Shape
 from .simulation import Simulation, SimulationError, StaleArray
+from .tables import ResultsError, Table, read_table
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
            "entries", "namelist", "parse_namelist", "read_table", "run", "seal", "study", "value_text", "write_bodies"]

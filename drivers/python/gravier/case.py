@@ -21,6 +21,8 @@ def value_text(value):
     if isinstance(value, (bool, np.bool_)):
         return ".true." if value else ".false."
     if isinstance(value, (str, Path)):
+        if "\n" in str(value):
+            raise CaseError(f"{str(value)!r}: expected a text on one line")
         return "'" + str(value).replace("'", "''") + "'"
     if isinstance(value, (list, tuple, np.ndarray)):
         return ", ".join(value_text(one) for one in value)
@@ -50,8 +52,8 @@ def entries(keys, name, missing):
     return full
 
 
-TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>'(?:[^'\n]|'')*'|"(?:[^"\n]|"")*")|(?P<group>&\w+)|(?P<key>[A-Za-z]\w*)\s*(?P<index>\([^()]*\))?\s*=|"""
-                   r"""(?P<mark>[/,])|(?P<word>[^\s&/=,!'"]+)|(?P<odd>\S))""")
+TOKEN = re.compile(r"""\s*(?:!.*|(?P<text>(?:\d+\*)?(?:'(?:[^'\n]|'')*'|"(?:[^"\n]|"")*"))|(?P<group>&\w+)|"""
+                   r"""(?P<key>[A-Za-z]\w*)\s*(?P<index>\([^()]*\))?\s*=|(?P<mark>[/,])|(?P<word>[^\s&/=,!'"()]+)|(?P<odd>\S))""")
 
 
 def parse_namelist(text):
@@ -125,13 +127,17 @@ class _Entry:
 def _values(token):
     """What one token stands for: several values where it repeats one, as 3*0.0."""
     if token["text"]:
-        quote = token["text"][0]
-        return [token["text"][1:-1].replace(2 * quote, quote)]
+        quote = token["text"][-1]
+        count, _, text = token["text"].partition(quote)
+        return [text[:-1].replace(2 * quote, quote)] * int(count.rstrip("*") or 1)
     count, star, word = token["word"].rpartition("*")
     if star and not word:
         return [None] * (int(count) if count.isdigit() else 1)
     if re.fullmatch(r"\.?[tT](rue|RUE)?\.?", word) or re.fullmatch(r"\.?[fF](alse|ALSE)?\.?", word):
         value = word.strip(".")[0] in "tT"
+    elif "_" in word:
+        # of Python, but of no input file: 1_000
+        value = word
     else:
         try:
             value = int(word)
@@ -161,19 +167,26 @@ ENVIRONMENT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": 
                "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OPENBLAS_NUM_THREADS": "1"}
 
 
-#: first line of the cases that `run` writes
-MADE = "! made by gravier.run\n"
+#: first line of the cases that `run` writes, and of its logs
+MADE, MADE_LOG = "! made by gravier.run\n", "made by gravier.run\n"
+#: what logs begin with that earlier versions made
+EARLIER_LOGS = r"Gravier \d|gravier: error: "
+
+
+def _claim(path, kinds):
+    """check_place, as an exception of this module."""
+    try:
+        check_place(path, kinds)
+    except Misplaced as refused:
+        raise CaseError(str(refused)) from None
 
 
 def write_case(groups, directory):
     """Write `groups` as case.nml into `directory`, which is made if need be. A case.nml that is there is replaced where this function has made
     it, or where it is the same case."""
     case, text = Path(directory) / "case.nml", namelist(groups)
-    try:
-        if not (case.is_file() and case.read_bytes() == text.encode()):
-            check_place(case, {".nml": MADE.encode()})
-    except Misplaced as refused:
-        raise CaseError(str(refused)) from None
+    if not (case.is_file() and case.read_bytes() == text.encode()):
+        _claim(case, {".nml": MADE.encode()})
     case.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(case) as part:
         part.write_text(MADE + text, encoding="utf-8")
@@ -181,9 +194,9 @@ def write_case(groups, directory):
 
 def run(groups, directory, ranks=1, program=None):
     """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
-    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance. A directory where another `run` is under way is refused,
-    and nothing in it changes."""
-    if ranks != int(ranks) or ranks < 1:
+    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance. A directory where another `run` is under way, or where a
+    case.nml or a terminal.log is of another origin, is refused, and nothing in it changes."""
+    if not (isinstance(ranks, (int, float, np.integer, np.floating)) and ranks >= 1 and ranks % 1 == 0):
         raise CaseError(f"ranks = {ranks}: expected a whole number above 0")
     directory = Path(directory)
     try:
@@ -199,14 +212,16 @@ def run(groups, directory, ranks=1, program=None):
 
 def run_alone(groups, directory, ranks, program):
     """What `run` does where no other one is under way."""
+    _claim(directory / "terminal.log", {".log": f"{MADE_LOG}|{EARLIER_LOGS}".encode()})
     write_case(groups, directory)
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
-        done = subprocess.run([launcher, "-n", str(ranks), str(program or find_program()), "case.nml"], cwd=directory,
+        print(MADE_LOG, end="", file=log, flush=True)
+        done = subprocess.run([launcher, "-n", str(int(ranks)), str(program or find_program()), "case.nml"], cwd=directory,
                               env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
                               check=False)
     if done.returncode not in (0, 3):
-        said = (directory / "terminal.log").read_text(encoding="utf-8", errors="replace")
+        said = (directory / "terminal.log").read_text(encoding="utf-8", errors="replace").removeprefix(MADE_LOG)
         lines = re.findall(r"^gravier: error: .*$", said, re.M) or said.strip().splitlines()[-1:]
         raise CaseError(f"{directory}: gravier ended with status {done.returncode}: {' '.join(lines)}")
     return done.returncode
@@ -216,6 +231,11 @@ def study(base, changes, directory, ranks=1):
     """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
     `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
     times is (group, name, key), with the `name` of the group, or its number from 1. Warns of runs that an older, larger study has left."""
+    for what, values in changes.items():
+        if not (isinstance(what, tuple) and len(what) in (2, 3)):
+            raise CaseError(f"{what!r}: expected (group, key), or (group, name, key) of a group that stands several times")
+        if isinstance(values, str) or not np.iterable(values):
+            raise CaseError(f"{what}: {values!r}; expected a list of values")
     points = list(itertools.product(*changes.values()))
     older = sorted(int(place.name[4:]) for place in Path(directory).glob("run_*") if place.name[4:].isdigit() and int(place.name[4:]) > len(points))
     if older:
@@ -234,8 +254,6 @@ def _group_of(groups, group, *rest):
     """The keys of a group, of one that stands several times by its name or number."""
     found = groups.setdefault(group, {})
     *which, key = rest
-    if len(which) > 1:
-        raise CaseError(f"{(group, *rest)}: expected (group, key), or (group, name, key) of a group that stands several times")
     several = found if isinstance(found, list) else [found]
     if which:
         own = [one for number, one in enumerate(several, 1) if which[0] in (number, one.get("name"))]

@@ -1,8 +1,10 @@
 """Bodies files from states of a run, from which other runs start."""
+from pathlib import Path
+
 import numpy as np
 from whole_file import Misplaced, check_place, hdf5_file, whole_file
 
-from .results import ResultsError
+from .tables import ResultsError
 
 #: what its bodies files say of their origin
 PROGRAM = "gravier.write_bodies"
@@ -43,6 +45,10 @@ def write_bodies(run, path, step=None):
         raise ResultsError(f"{run.path}: a periodic cell that moves: expected a run whose periods stay; a checkpoint holds such a cell")
     bodies, boundaries = run.bodies(step), run.boundaries(step)
     contacts, names = given_contacts(run, step)
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+    except OSError as what:
+        raise ResultsError(f"{path}: {what.strerror}; expected a place for a file") from None
     with whole_file(path) as part, hdf5_file(part, PROGRAM) as file:
         for name in ("id", "position", "radius", "mass", "material"):
             if name in bodies:

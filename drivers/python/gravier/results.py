@@ -1,5 +1,4 @@
 """What a run left in its directory, as numpy arrays."""
-import csv
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -9,37 +8,10 @@ import numpy as np
 from .case import CaseError, entries, parse_namelist
 from .checksum import is_whole
 from .shapes import axes_of, ball, shapes_of
+from .tables import ResultsError, Table, one_line, read_table
 
-
-class ResultsError(Exception):
-    """One line: what was found and what was expected."""
-
-
-class Table(dict):
-    """Columns by name, as keys and as attributes: arrays (rows) or (rows, components)."""
-
-    def __getattr__(self, name):
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"no column {name}; expected one of {', '.join(self) or 'none'}") from None
-
-    def __len__(self):
-        return len(next(iter(self.values()))) if self.keys() else 0
-
-    def frame(self):
-        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy."""
-        import pandas
-
-        columns = {}
-        for name, values in self.items():
-            if values.ndim == 1:
-                columns[name] = values
-            elif values.ndim == 3:
-                columns.update({f"{name}_{'xyz'[j]}{'xyz'[k]}": values[:, j, k] for j in range(values.shape[1]) for k in range(values.shape[2])})
-            else:
-                columns.update({f"{name}_{'xyz'[k]}": values[:, k] for k in range(values.shape[1])})
-        return pandas.DataFrame(columns)
+#: columns without which nothing can be drawn
+FINITE = ("position", "radius", "velocity", "normal", "gap", "impulse", "force", "point", "orientation", "edge", "origin")
 
 
 @contextmanager
@@ -52,7 +24,7 @@ def _opened(path, kind):
             yield file
     except (ArithmeticError, AttributeError, CaseError, LookupError, MemoryError, OSError, RuntimeError, TypeError, ValueError) as reason:
         # h5py and numpy have all of these for what is not as a run wrote it
-        raise ResultsError(f"{path}: cannot read this file; expected {kind}: {_one_line(reason)}") from None
+        raise ResultsError(f"{path}: cannot read this file; expected {kind}: {one_line(reason)}") from None
 
 
 def tangents(normal):
@@ -71,29 +43,6 @@ def along(parts, axes):
     return sum(part[:, None] * axis for part, axis in zip(parts.T, axes))
 
 
-def read_table(path, columns=()):
-    """A CSV file with one row of names: numbers by column. `columns` are those that it must have. A last row without its end is left out."""
-    try:
-        with open(path, newline="", encoding="ascii") as file:
-            # the last row of a run that is under way or was killed may be cut off
-            header, *rows = list(csv.reader(file.read().rpartition("\n")[0].splitlines())) or [[]]
-    except OSError as reason:
-        raise ResultsError(f"{path}: {reason.strerror}; expected a table that a run wrote") from None
-    except (ValueError, csv.Error) as reason:
-        raise ResultsError(f"{path}: {_one_line(reason)}; expected a table that a run wrote") from None
-    for line, row in enumerate(rows, 2):
-        if len(row) != len(header):
-            raise ResultsError(f"{path}: line {line}: {len(row)} values; expected {len(header)}, as many as names")
-    try:
-        values = np.array(rows, dtype=float).reshape(len(rows), len(header))
-    except ValueError as reason:
-        raise ResultsError(f"{path}: {reason}; expected numbers under a row of names") from None
-    for name in columns:
-        if name not in header:
-            raise ResultsError(f"{path}: no column {name}; expected a table that a run wrote")
-    return Table({name: values[:, k] for k, name in enumerate(header)})
-
-
 class Run:
     """The output directory of a run, finished or under way. Files are opened when something is read, and closed again.
 
@@ -109,7 +58,7 @@ class Run:
                             "contacts_per_grain")}
 
     def __init__(self, directory):
-        self.directory = Path(directory)
+        self.directory = _path(directory, "a directory")
         self.path = self.directory / "results.h5"
         with self._open() as file:
             what = file["run"].attrs
@@ -159,8 +108,10 @@ class Run:
                 raise ResultsError(f"{self.path}: {group.name}/{key}: {len(values)} rows; expected {len(table)}, as in the others")
             if key not in ("name", "shape") and values.dtype.kind not in "iuf":
                 raise ResultsError(f"{self.path}: {group.name}/{key}: values of type {values.dtype}; expected numbers")
-            if key in ("position", "radius") and not np.isfinite(values).all():
+            if key in FINITE and not np.isfinite(values).all():
                 raise ResultsError(f"{self.path}: {group.name}/{key}: a value that is not a finite number")
+            if key == "radius" and not np.all(values > 0.0):
+                raise ResultsError(f"{self.path}: {group.name}/{key}: {values.min():g}; expected radii above 0")
             if key in ("position", "velocity", "normal", "impulse", "force", "point") and (values.ndim != 2 or values.shape[1] < self.dimension):
                 raise ResultsError(f"{self.path}: {group.name}/{key}: shape {values.shape}; expected (rows, {self.dimension} or more)")
         return table
@@ -203,6 +154,8 @@ class Run:
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
+                if file[f"boundaries/{key}"].dtype.kind in "iuf":
+                    raise ResultsError(f"{self.path}: /boundaries/{key}: numbers; expected texts")
                 rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
         if "axes" in rows:
             rows["axes"] = rows["axes"].reshape(-1, self.dimension, self.dimension)
@@ -284,9 +237,9 @@ class Run:
         step = self.find_step(step)
         with self._open() as file:
             place = f"steps/{step}/regions/{name}"
-            if place not in file:
-                held = ", ".join(file[f"steps/{step}/regions"] if f"steps/{step}/regions" in file else ()) or "none, the step has no regions"
-                raise ResultsError(f"{self.path}: no region {name} in step {step}; expected one of {held}")
+            held = list(file[f"steps/{step}/regions"]) if f"steps/{step}/regions" in file else []
+            if name not in held:
+                raise ResultsError(f"{self.path}: no region {name} in step {step}; expected one of {', '.join(held) or 'none, the step has no regions'}")
             rows = self._table(file[place], "regions")
         if any(values.ndim != 1 + (key in ("lower", "upper", "velocity", "stress")) for key, values in rows.items()):
             raise ResultsError(f"{self.path}: /{place}: an array of another shape than a run writes")
@@ -317,7 +270,10 @@ class Run:
 
     def time_step(self):
         """Of the run [s], from the input."""
-        return float(self.case["time"][0]["step"])
+        try:
+            return float(self.case["time"][0]["step"])
+        except (LookupError, TypeError, ValueError):
+            raise ResultsError(f"{self.path}: its case has no time step; expected {self._kind}") from None
 
     def chains(self, step=None):
         """Contacts as segments (n, 2, d), from the centre of the candidate to that of the antagonist's nearest image, or to
@@ -397,9 +353,10 @@ class Run:
             return cell.edge[::-1]
         return np.diag(self.period)[self.period > 0]
 
-    @staticmethod
-    def _rows(bodies, contacts):
+    def _rows(self, bodies, contacts):
         """Rows of candidates and antagonists in `bodies`, whose ids ascend; -1 for boundaries."""
+        if np.any(np.diff(bodies.id) <= 0) or not np.isin(contacts.candidate, bodies.id).all():
+            raise ResultsError(f"{self.path}: bodies whose ids do not ascend, or a contact whose candidate is none of them; expected {self._kind}")
         row = np.searchsorted(bodies.id, contacts.candidate)
         other = np.minimum(np.searchsorted(bodies.id, contacts.antagonist), len(bodies) - 1)
         return row, np.where(bodies.id[other] == contacts.antagonist, other, -1)
@@ -414,7 +371,7 @@ class BodiesFile(Run):
     _columns = {"bodies": ("id", "position", "radius"), "walls": ("id", "point", "normal")}
 
     def __init__(self, path):
-        self.path = Path(path)
+        self.path = _path(path, "a file")
         self.directory = self.path.parent
         with self._open() as file:
             self.dimension = int(file["bodies/position"].shape[1])
@@ -450,16 +407,36 @@ class BodiesFile(Run):
         self.find_step(step)
 
     def _contacts_or_error(self, step):
-        raise ResultsError(f"{self.path}: a bodies file has no contacts; expected the results of a run")
+        self._missing("contacts")
+
+    def _attribute(self, step, name):
+        self.find_step(step)
+        return np.nan
+
+    def _missing(self, what):
+        raise ResultsError(f"{self.path}: a bodies file has no {what}; expected the results of a run")
+
+    def time_step(self):
+        """An error, as the two below: a bodies file has none."""
+        self._missing("time step")
+
+    def history(self):
+        self._missing("history")
+
+    def trace(self):
+        self._missing("trace")
 
     def subdomain(self, step=None):
         """An error: a bodies file has none."""
-        raise ResultsError(f"{self.path}: a bodies file has no subdomains; expected the results of a run")
+        self._missing("subdomains")
+
+
+def _path(given, what):
+    try:
+        return Path(given)
+    except TypeError:
+        raise ResultsError(f"{given!r}: expected the path of {what}") from None
 
 
 def _text(value):
     return value.decode() if isinstance(value, bytes) else str(value)
-
-
-def _one_line(reason):
-    return " ".join(str(reason).split())

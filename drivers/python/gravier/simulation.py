@@ -98,12 +98,20 @@ class _Memory:
         self.__array_interface__ = {"data": (address, True), "shape": shape, "typestr": kind, "version": 3}
 
 
+#: kinds of arrays whose values are no numbers, although numpy makes numbers of some of them
+NO_NUMBERS = "USVmM"
+
+
 def _reals(values, what, shape=None):
     """An array of doubles, of a shape where one is asked for."""
+    if isinstance(values, np.ma.MaskedArray):
+        raise SimulationError(f"{what}: a masked array; expected numbers for all entries")
     try:
         found = np.asarray(_plain(values))
         if found.dtype.kind == "c":
             raise SimulationError(f"{what}: an array of complex numbers; expected real ones")
+        if found.dtype.kind in NO_NUMBERS or (found.dtype.kind == "O" and any(np.asarray(one).dtype.kind in NO_NUMBERS for one in found.flat)):
+            raise SimulationError(f"{what}: expected numbers")
         found = np.array(found, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise SimulationError(f"{what}: expected numbers") from None
@@ -225,8 +233,9 @@ class Bodies:
             raise AttributeError(f"array {name} of bodies cannot be set; expected one of velocity, spin, force")
         counts = [len(one) for one in self._subdomains]
         values = _reals(values, name)
-        if values.ndim != 2 or len(values) != sum(counts):
-            raise SimulationError(f"{name}: an array of shape {values.shape}; expected a row for each of the {sum(counts)} bodies of this rank")
+        if values.shape != (sum(counts), self._columns[name]):
+            raise SimulationError(f"{name}: an array of shape {values.shape}; expected ({sum(counts)}, {self._columns[name]}), a row for "
+                                  "each body of this rank")
         parts = np.split(values, np.cumsum(counts)[:-1])
         wholes = [(one, *one._whole(name, part)) for one, part in zip(self._subdomains, parts)]
         # nothing is set where a subdomain refuses its part
@@ -291,6 +300,9 @@ class Simulation:
     # a name that is misspelt is refused
     __slots__ = ("mark", "status", "dimension", "rank", "ranks", "_made", "subdomains", "bodies", "boundaries", "_handle", "__weakref__")
 
+    #: the one that is open in this process
+    _open = None
+
     def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None):
         #: counts steps: arrays of bodies are of one of them
         self.mark = 0
@@ -302,16 +314,29 @@ class Simulation:
         options = RESTART * bool(restart) + QUIET * bool(quiet) + FORCES * bool(forces)
         number = None if communicator is None else ctypes.pointer(ctypes.c_int(communicator.py2f()))
         command = " ".join(["gravier.Simulation", *sys.argv]).encode(errors="replace")
+        try:
+            path = os.fsencode(case)
+        except TypeError:
+            raise SimulationError(f"{case!r}: expected the path of an input file") from None
+        if Simulation._open is not None:
+            raise SimulationError("open: a simulation is open in this process; expected that it is closed before, by gravier.Simulation.opened().close() "
+                                  "if it is lost", of_all_ranks=True)
         sys.stdout.flush()
-        call("open", os.fsencode(case), command, options, number, ctypes.byref(self._handle))
+        call("open", path, command, options, number, ctypes.byref(self._handle))
         # a script that ends without close
         atexit.register(self._leave)
+        Simulation._open = self
         self.dimension, self.rank, self.ranks = self.whole("dimension"), self.whole("rank"), self.whole("ranks")
         #: bodies by subdomain of this rank, bodies of this rank, boundaries by name
         self.subdomains = [Subdomain(self, k) for k in range(self.whole("subdomains"))]
         d = self.dimension
         self.bodies = Bodies(self.subdomains, {"position": d, "velocity": d, "force": d, "spin": self.whole("velocity_entries") - d, "orientation": 0})
         self.boundaries = Boundaries(self)
+
+    @staticmethod
+    def opened():
+        """The simulation that is open in this process, also where no name of the script holds it any more; None where none is."""
+        return Simulation._open
 
     def __enter__(self):
         return self
@@ -383,6 +408,7 @@ class Simulation:
         if self._handle is None:
             return self.status
         atexit.unregister(self._leave)
+        Simulation._open = None
         self._made = self.made
         handle, self._handle = self._handle, None
         self.mark += 1
