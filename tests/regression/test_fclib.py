@@ -502,10 +502,11 @@ class Fclib(RunTestCase):
         self.assertTrue(np.isinf(seconds).any() and np.isfinite(seconds).any(axis=1).all(), seconds)
         profile = read_table(self.path("profile.csv"))
         for k, ratio in enumerate(np.array(profile["ratio"], float)):
-            solved = seconds <= ratio * (1 + 1e-12) * seconds.min(axis=1, keepdims=True)
-            expected = np.mean(solved & np.isfinite(seconds), axis=0)
-            found = [float(profile[method][k]) for method in ("auto", "nlgs", "momentum", "newton")]
-            np.testing.assert_allclose(found, expected, err_msg=f"ratio {ratio}")
+            # two solves of as many ticks of the clock differ by rounding
+            least, most = (np.mean((seconds <= ratio * near * seconds.min(axis=1, keepdims=True)) & np.isfinite(seconds), axis=0)
+                           for near in (1 - 1e-9, 1 + 1e-9))
+            found = np.array([float(profile[method][k]) for method in ("auto", "nlgs", "momentum", "newton")])
+            self.assertTrue((least - 1e-9 <= found).all() and (found <= most + 1e-9).all(), f"ratio {ratio}: {least} {found} {most}")
 
     def test_bad_files(self):
         w, q, mu = random_problem(3, 4)
