@@ -46,7 +46,6 @@ class Walls:
         rows, time = run.boundaries(step), run.time(step)
         known = {keys.get("name", f"boundary {k}"): keys for k, keys in enumerate(run.case.get("boundary", []), 1)}
         there = numpy.array([time < known.get(name, {}).get("remove_at", numpy.inf) for name in rows.name], dtype=bool)
-        self.dimension = run.dimension
         self.rows = gravier.Table({key: values[there] for key, values in rows.items()})
         self.keys = [known.get(name, {}) for name in rows.name[there]]
         facets = run.facets(step)
@@ -60,26 +59,21 @@ class Walls:
         return self.rows.position[chosen], self.rows.normal[chosen]
 
     def polygons(self):
-        """Corners of segments and rectangles (c, d) and points of circles, where they are now; one that turns, as it was at the start."""
-        for shape, point, keys in zip(self.rows.shape, self.rows.position, self.keys):
-            if shape == "segment":
-                yield numpy.array([point, point + self._vector(keys, "end") - self._vector(keys, "point")])
-            elif shape == "rectangle":
-                a, b = self._vector(keys, "edge_a"), self._vector(keys, "edge_b")
+        """Corners of segments and rectangles (c, d) and points of circles, where they are now; results of older versions do not tell."""
+        for k, (shape, point, keys) in enumerate(zip(self.rows.shape, self.rows.position, self.keys)):
+            if shape == "segment" and "edges" in self.rows:
+                yield numpy.array([point, point + self.rows.edges[k, 0]])
+            elif shape == "rectangle" and "edges" in self.rows:
+                a, b = self.rows.edges[k]
                 yield numpy.array([point, point + a, point + a + b, point + b])
             elif shape == "circle" and "radius" in keys:
                 yield point + keys["radius"] * numpy.column_stack([numpy.cos(ARC), numpy.sin(ARC)])
 
     def cylinders(self):
         """Point, direction and radius of each."""
-        for shape, point, keys in zip(self.rows.shape, self.rows.position, self.keys):
-            axis = self._vector(keys, "axis")
-            if shape == "cylinder" and "radius" in keys and axis.any():
-                yield point, axis / numpy.linalg.norm(axis), float(keys["radius"])
-
-    def _vector(self, keys, name):
-        """Of a case, where entries that nothing is said of are 0."""
-        return gravier.entries(keys, name, numpy.zeros(self.dimension))
+        for k, (shape, point, keys) in enumerate(zip(self.rows.shape, self.rows.position, self.keys)):
+            if shape == "cylinder" and "radius" in keys and "axis" in self.rows:
+                yield point, self.rows.axis[k], float(keys["radius"])
 
 
 def box_corners(low, high):

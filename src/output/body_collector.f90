@@ -6,7 +6,6 @@ module gravier_body_collector
   use gravier_body_mass, only: invert_symmetric, multiply_symmetric
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_body_store, only: collect_fields
-  use gravier_pair_places, only: has_facets
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -57,13 +56,13 @@ contains
   end function has_glued
 
   !> Where all boundaries are, how they move and what the grains did to them in the last step: the table `boundaries` with the key
-  !> `id`, the same on all ranks. Where some have facets, `axes` are those of their files, one after the other.
+  !> `id`, the same on all ranks.
   subroutine collect_boundaries(simulation, table)
     type(simulation_t), intent(in) :: simulation
     type(field_list_t), intent(out) :: table
-    real(dp), allocatable :: position(:, :), normal(:, :), velocity(:, :), force(:, :), axes(:, :)
-    real(dp) :: place(3), along(3, 3)
-    integer :: b, d, nd, n
+    real(dp), allocatable :: position(:, :), normal(:, :), velocity(:, :), force(:, :)
+    real(dp) :: place(3)
+    integer :: b, nd, n
 
     nd = simulation%decomposition%nd
     associate (boundaries => simulation%decomposition%boundaries)
@@ -86,19 +85,46 @@ contains
     call table%add_reals("normal", "", normal)
     call table%add_reals("velocity", "m/s, rad/s", velocity)
     call table%add_reals("force", "N", force)
-    associate (boundaries => simulation%decomposition%boundaries)
-      if (.not. has_facets(boundaries)) return
-      allocate (axes(nd*nd, n), source=0.0_dp)
-      do b = 1, n
-        if (.not. boundaries(b)%is_faceted()) cycle
-        call boundaries(b)%surface%find_axes(along)
-        do d = 1, nd
-          axes(nd*(d - 1) + 1:nd*d, b) = along(1:nd, d)
-        end do
-      end do
-    end associate
-    call table%add_reals("axes", "", axes)
+    call collect_lie(simulation%decomposition%boundaries, nd, table)
   end subroutine collect_boundaries
+
+  !> How boundaries lie now, where they have what can turn: `edges` of segments and rectangles from their positions, one after the
+  !> other; `axis`, along which cylinders go on for ever; `axes` of the files of those that have facets, one after the other.
+  subroutine collect_lie(boundaries, nd, table)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: nd
+    type(field_list_t), intent(inout) :: table
+    real(dp), allocatable :: edges(:, :), axis(:, :), axes(:, :)
+    real(dp) :: along(3, 3)
+    logical :: has(3)
+    integer :: b, d
+
+    has(:) = .false.
+    allocate (edges(nd*(nd - 1), size(boundaries)), axis(nd, size(boundaries)), axes(nd*nd, size(boundaries)), source=0.0_dp)
+    do b = 1, size(boundaries)
+      if (.not. allocated(boundaries(b)%surface)) cycle
+      associate (surface => boundaries(b)%surface)
+        if (surface%is%faceted) then
+          call surface%find_axes(along)
+          do d = 1, nd
+            axes(nd*(d - 1) + 1:nd*d, b) = along(1:nd, d)
+          end do
+          has(3) = .true.
+        else if (surface%is%endless_axis) then
+          axis(:, b) = surface%axis(1:nd)
+          has(2) = .true.
+        else if (.not. surface%is%endless .and. any(abs(surface%edge) > 0.0_dp)) then
+          do d = 1, nd - 1
+            edges(nd*(d - 1) + 1:nd*d, b) = surface%edge(1:nd, d)
+          end do
+          has(1) = .true.
+        end if
+      end associate
+    end do
+    if (has(1)) call table%add_reals("edges", "m", edges)
+    if (has(2)) call table%add_reals("axis", "", axis)
+    if (has(3)) call table%add_reals("axes", "", axes)
+  end subroutine collect_lie
 
   !> The edges of the periodic cell and their rates, the corner of the box that grains are kept in and, along each axis, its length:
   !> an item an axis.

@@ -221,6 +221,27 @@ class Pictures(RunTestCase):
         self.assertTrue(np.all(corners >= limits[0]) and np.all(corners <= limits[1]))
         plt.close(figure)
 
+    def test_walls_that_turn(self):
+        """A segment that turns about its middle, and a cylinder whose axis does, are drawn as they lie."""
+        flat = {"scene": {"bodies": "lattice", "lattice_count": [1, 1], "radius_min": 0.01, "radius_max": 0.01, "gravity": [0.0, 0.0]},
+                "boundary": [{"name": "bar", "shape": "segment", "point": [1.0, 1.0], "end": [3.0, 1.0], "pivot": [2.0, 1.0], "rotation": 1.0}],
+                "time": {"step": 1e-2, "steps": 100}, "output": {"directory": "results", "every": 100}}
+        space = {"scene": {**flat["scene"], "dimension": 3, "lattice_count": [1, 1, 1], "gravity": [0.0, 0.0, 0.0]},
+                 "boundary": [{"name": "drum", "shape": "cylinder", "point": [0.0, 0.0, 0.0], "axis": [0.0, 2.0, 0.0], "radius": 5.0, "rotation": [1.0, 0.0, 0.0]},
+                              {"name": "plate", "shape": "rectangle", "point": [1.0, 0.0, 0.0], "edge_a": [2.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0],
+                               "pivot": [1.0, 0.0, 0.0], "rotation": [1.0, 0.0, 0.0]}],
+                 "time": flat["time"], "output": flat["output"]}
+        along = np.array([np.cos(1.0), np.sin(1.0)])
+        for name, case in (("bar", flat), ("drum", space)):
+            self.assertEqual(gravier.run(case, self.here(name)), 0)
+            walls = picture_space.Walls(gravier.Run(self.here(name + "/results")), 100)
+            if name == "bar":
+                np.testing.assert_allclose(list(walls.polygons()), [[[2.0, 1.0] - along, [2.0, 1.0] + along]], rtol=1e-9)
+            else:
+                np.testing.assert_allclose([axis for _, axis, _ in walls.cylinders()], [[0.0, *along]], atol=1e-9)
+                corners = np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, *along], [1.0, *along]])
+                np.testing.assert_allclose(list(walls.polygons()), [corners], atol=1e-9)
+
     def test_walls_in_space(self):
         """The box holds the whole drum between its planes; circles are drawn at both ends; numbers lie on no other and on no body."""
         bodies, walls = self.cylinder.bodies(), picture_space.Walls(self.cylinder, 1)

@@ -150,15 +150,16 @@ class Run:
         return self._split(self._group(step, "bodies"))
 
     def boundaries(self, step=None):
-        """id, name, shape, position, normal, velocity, spin, force and, where some have facets, axes (n, d, d), a row each."""
+        """id, name, shape, position, normal, velocity, spin, force, a row each, and how they lie: edges (n, d - 1, d) where some are segments or
+        rectangles, axis (n, d) where some are cylinders, axes (n, d, d) where some have facets."""
         rows = self._split(self._group(step, "boundaries"))
         with self._open() as file:
             for key in ("name", "shape"):
                 if file[f"boundaries/{key}"].dtype.kind in "iuf":
                     raise ResultsError(f"{self.path}: /boundaries/{key}: numbers; expected texts")
                 rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
-        if "axes" in rows:
-            rows["axes"] = rows["axes"].reshape(-1, self.dimension, self.dimension)
+        for key in {"edges", "axes"} & set(rows):
+            rows[key] = rows[key].reshape(len(rows[key]), -1, self.dimension)
         return rows
 
     def cell(self, step=None):

@@ -25,7 +25,7 @@ class Table(dict):
         return len(next(iter(self.values()))) if self.keys() else 0
 
     def frame(self):
-        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner 1 NAME_1y. Impulses
+        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner or edge 1 NAME_1y. Impulses
         and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""
         import pandas
 
@@ -40,7 +40,7 @@ class Table(dict):
         if shape in ((), (1,)):
             return ["_z" if name in TURNS else ""]
         axes = "nts" if name in ("impulse", "moment") and "impulse" in self else "wxyz" if shape == (4,) else "xyz"
-        rows = [""] if len(shape) == 1 else "123" if name == "corners" else axes
+        rows = [""] if len(shape) == 1 else "123" if name in ("corners", "edges") else axes
         return [f"_{row}{axis}" for row in rows[:shape[0] if len(shape) > 1 else 1] for axis in axes[:shape[-1]]]
 
 

@@ -532,6 +532,8 @@ contains
     call check_close(number_of(file, "/boundaries/normal", 1, 2), 1.0_dp, 0.0_dp, "normal of the floor")
     call check_close(abs(number_of(file, "/boundaries/normal", 2, 1)) + abs(number_of(file, "/boundaries/normal", 2, 2)), 0.0_dp, &
       & 0.0_dp, "a segment has none")
+    call check_close(number_of(file, "/steps/0/boundaries/edges", 2, 1), 1.0_dp, 0.0_dp, "its edge")
+    call check_members(file, "/steps/0/boundaries", "axis axes", .false.)
     call check_members(file, "/steps/0", "bodies boundaries", .true.)
     ! no contact and no figure is known at the start
     call check_members(file, "/steps/0", "contacts diagnostics", .false.)
