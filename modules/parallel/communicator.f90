@@ -3,11 +3,11 @@
 module gravier_communicator
   use, intrinsic :: iso_c_binding, only: c_funloc, c_funptr, c_int
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_value, ieee_quiet_nan
-  use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, MPI_Finalize, &
-    & MPI_Finalized, MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, MPI_Comm_dup, &
-    & MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, MPI_Get_library_version, &
-    & MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, MPI_LOGICAL, MPI_SUM, &
-    & MPI_MIN, MPI_MAX, MPI_LOR, MPI_BOR, MPI_BXOR
+  use mpi_f08, only: MPI_Comm, MPI_Request, MPI_COMM_WORLD, MPI_COMM_NULL, MPI_STATUS_IGNORE, MPI_Init, MPI_Initialized, &
+    & MPI_Finalize, MPI_Finalized, MPI_COMM_TYPE_SHARED, MPI_INFO_NULL, MPI_Comm_rank, MPI_Comm_size, MPI_Comm_split_type, &
+    & MPI_Comm_dup, MPI_Comm_free, MPI_Allreduce, MPI_Exscan, MPI_Bcast, MPI_Barrier, MPI_Ibarrier, MPI_Test, &
+    & MPI_Get_library_version, MPI_MAX_LIBRARY_VERSION_STRING, MPI_INTEGER, MPI_INTEGER8, MPI_DOUBLE_PRECISION, MPI_CHARACTER, &
+    & MPI_LOGICAL, MPI_SUM, MPI_MIN, MPI_MAX, MPI_LOR, MPI_BOR, MPI_BXOR
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input, status_failure
@@ -136,11 +136,17 @@ contains
   end subroutine communicator_init
 
   !> Duplicate a communicator by its handle, the integer that Fortran and C (MPI_Comm_c2f) have for it. Collective.
-  subroutine communicator_init_from(self, handle)
+  subroutine communicator_init_from(self, handle, error)
     class(communicator_t), intent(inout) :: self
     integer, intent(in) :: handle
+    !> it is none, on this process: input
+    type(error_t), allocatable, intent(inout) :: error
     type(MPI_Comm) :: parent
 
+    if (handle == MPI_COMM_NULL%mpi_val) then
+      call raise(error, status_input, "communicator: MPI_COMM_NULL; expected one that has this process")
+      return
+    end if
     parent%mpi_val = handle
     call self%init(parent)
   end subroutine communicator_init_from

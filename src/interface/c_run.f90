@@ -2,7 +2,7 @@
 !> closed, and its figures. Handles point to a user_loop_t. Every function that can fail returns 0 or the exit status of its error,
 !> whose line gravier_error tells; none ends the process.
 module gravier_c_run
-  use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_associated, c_double, c_f_pointer, c_int, c_int64_t, c_null_ptr, c_ptr
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_abandon, only: end_all_ranks
@@ -10,6 +10,7 @@ module gravier_c_run
   use gravier_solve, only: solve_converged
   use gravier_run_tally, only: relative_error
   use gravier_user_loop, only: user_loop_t
+  use gravier_c_handle, only: is_open, keep_open, forget_open, find_loop
   use gravier_c_text, only: told, text_of
   implicit none
   private
@@ -19,8 +20,8 @@ module gravier_c_run
   !> bits of the options of gravier_open
   integer, parameter :: restart_bit = 0, quiet_bit = 1, forces_bit = 2
 
-  !> MPI was started here; a run is open
-  logical :: started = .false., is_open = .false.
+  !> MPI was started here
+  logical :: started = .false.
 
 contains
 
@@ -37,25 +38,24 @@ contains
     integer(c_int), pointer :: number
 
     handle = c_null_ptr
-    if (is_open) call raise(error, status_input, "open: a simulation is open in this process; expected that it is closed before")
+    if (is_open()) call raise(error, status_input, "open: a simulation is open in this process; expected that it is closed before")
     call join_parallel(started, error)
     if (.not. allocated(error)) then
       allocate (loop)
       if (c_associated(communicator)) then
         call c_f_pointer(communicator, number)
-        call loop%comm%init_from(number)
+        call loop%comm%init_from(number, error)
       else
         call loop%comm%init()
       end if
-      call loop%open(text_of(path), text_of(command), btest(options, restart_bit), btest(options, quiet_bit), &
-        & btest(options, forces_bit), error)
+      if (.not. allocated(error)) call loop%open(text_of(path), text_of(command), btest(options, restart_bit), &
+        & btest(options, quiet_bit), btest(options, forces_bit), error)
       if (allocated(error)) then
         later = error
-        call loop%close(later)
+        if (loop%comm%alive) call loop%close(later)
         deallocate (loop)
       else
-        is_open = .true.
-        handle = c_loc(loop)
+        handle = keep_open(loop)
       end if
     end if
     status = told(error)
@@ -67,8 +67,8 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call loop%step(error)
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%step(error)
     status = told(error)
   end function gravier_step
 
@@ -80,8 +80,8 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call loop%stop(text_of(reason), error)
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%stop(text_of(reason), error)
     status = told(error)
   end function gravier_stop
 
@@ -91,8 +91,8 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call loop%write_checkpoint(error)
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%write_checkpoint(error)
     status = told(error)
   end function gravier_checkpoint
 
@@ -103,11 +103,14 @@ contains
     type(error_t), allocatable :: error
     integer :: ended
 
-    call c_f_pointer(handle, loop)
-    call loop%close(error)
-    ended = loop%run%status
-    deallocate (loop)
-    is_open = .false.
+    call find_loop(handle, loop, error)
+    ended = 0
+    if (.not. allocated(error)) then
+      call loop%close(error)
+      ended = loop%run%status
+      deallocate (loop)
+      call forget_open()
+    end if
     status = told(error)
     if (.not. allocated(error)) status = int(ended, c_int)
   end function gravier_close
@@ -132,10 +135,20 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
     value = 0
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call find_whole(loop, text_of(name), value, error)
+    status = told(error)
+  end function gravier_whole
+
+  subroutine find_whole(loop, name, value, error)
+    type(user_loop_t), intent(in) :: loop
+    character(len=*), intent(in) :: name
+    integer(c_int64_t), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
     associate (simulation => loop%run%simulation, figures => loop%run%figures)
-      select case (text_of(name))
+      select case (name)
       case ("goes_on")
         value = merge(1, 0, loop%goes_on())
       case ("step")
@@ -169,11 +182,10 @@ contains
       case ("entered")
         value = figures%entered
       case default
-        call raise(error, status_input, "whole number '"//text_of(name)//"': unknown; gravier.h has the names")
+        call raise(error, status_input, "whole number '"//name//"': unknown; gravier.h has the names")
       end select
     end associate
-    status = told(error)
-  end function gravier_whole
+  end subroutine find_whole
 
   !> A real number of a run by its name.
   integer(c_int) function gravier_real(handle, name, value) result(status) bind(C, name="gravier_real")
@@ -184,10 +196,20 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
     value = 0.0_dp
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call find_real(loop, text_of(name), value, error)
+    status = told(error)
+  end function gravier_real
+
+  subroutine find_real(loop, name, value, error)
+    type(user_loop_t), intent(in) :: loop
+    character(len=*), intent(in) :: name
+    real(dp), intent(inout) :: value
+    type(error_t), allocatable, intent(inout) :: error
+
     associate (simulation => loop%run%simulation, figures => loop%run%figures)
-      select case (text_of(name))
+      select case (name)
       case ("time")
         value = simulation%time
       case ("time_step")
@@ -211,11 +233,10 @@ contains
       case ("velocity_error")
         value = relative_error(figures%solve)
       case default
-        call raise(error, status_input, "real number '"//text_of(name)//"': unknown; gravier.h has the names")
+        call raise(error, status_input, "real number '"//name//"': unknown; gravier.h has the names")
       end select
     end associate
-    status = told(error)
-  end function gravier_real
+  end subroutine find_real
 
   !> Sums over the ranks, in place, that do not depend on their order. Collective.
   subroutine gravier_sum(handle, n, values) bind(C, name="gravier_sum")
@@ -223,9 +244,13 @@ contains
     integer(c_int), value :: n
     real(c_double), intent(inout) :: values(n)
     type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
     real(dp) :: parts(n, 1)
+    integer(c_int) :: status
 
-    call c_f_pointer(handle, loop)
+    call find_loop(handle, loop, error)
+    status = told(error)
+    if (status /= 0) return
     parts(:, 1) = values
     call loop%comm%sum_parts(parts, values)
   end subroutine gravier_sum
@@ -236,9 +261,12 @@ contains
     integer(c_int), value :: n
     real(c_double), intent(inout) :: values(n)
     type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
+    integer(c_int) :: status
 
-    call c_f_pointer(handle, loop)
-    call loop%comm%highest_of(values)
+    call find_loop(handle, loop, error)
+    status = told(error)
+    if (status == 0) call loop%comm%highest_of(values)
   end subroutine gravier_highest
 
 end module gravier_c_run

@@ -1,6 +1,6 @@
 !> The C interface of the scene of a run (gravier_c_run), between two steps: bodies, boundaries, loads and coefficients.
 module gravier_c_scene
-  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_f_pointer, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
+  use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_text, only: to_text
@@ -8,6 +8,7 @@ module gravier_c_scene
   use gravier_user_loop, only: user_loop_t
   use gravier_user_bodies, only: newcomers_t, add_bodies, remove_bodies
   use gravier_user_boundaries, only: get_boundary, set_boundary
+  use gravier_c_handle, only: find_loop
   use gravier_c_text, only: told, text_of, put_text
   implicit none
   private
@@ -39,12 +40,11 @@ contains
     real(dp), pointer :: values(:, :)
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
     address = c_null_ptr
     shape(1) = 0
     shape(2) = 1
     kind = kind_int32
-    call check_subdomain(loop, subdomain, error)
+    call find_subdomain(handle, subdomain, loop, error)
     if (.not. allocated(error)) then
       owned => loop%run%simulation%decomposition%owned(subdomain + 1)
       shape(1) = owned%n
@@ -85,8 +85,7 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call check_subdomain(loop, subdomain, error)
+    call find_subdomain(handle, subdomain, loop, error)
     if (.not. allocated(error)) call loop%check_array(text_of(name), subdomain + 1, values, error)
     status = told(error)
   end function gravier_check_array
@@ -104,8 +103,7 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call check_subdomain(loop, subdomain, error)
+    call find_subdomain(handle, subdomain, loop, error)
     if (.not. allocated(error)) call loop%set_array(text_of(name), subdomain + 1, values, error)
     status = told(error)
   end function gravier_set_array
@@ -118,8 +116,8 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call loop%set_gravity(values, error)
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%set_gravity(values, error)
     status = told(error)
   end function gravier_set_gravity
 
@@ -130,8 +128,8 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call loop%set_friction(0, value, error)
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%set_friction(0, value, error)
     status = told(error)
   end function gravier_set_friction
 
@@ -145,24 +143,24 @@ contains
     type(error_t), allocatable :: error
     integer :: b
 
-    call c_f_pointer(handle, loop)
-    call loop%place(text_of(name), b, error)
+    b = 0
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call loop%place(text_of(name), b, error)
     number = int(b - 1, c_int)
     status = told(error)
   end function gravier_boundary
 
-  !> Name of boundary `number`, from 0, valid until the next call; null where there is none.
+  !> Name of boundary `number`, from 0, valid until the next call; null where there is none, which the last error tells.
   type(c_ptr) function gravier_boundary_name(handle, number) result(name) bind(C, name="gravier_boundary_name")
     type(c_ptr), value :: handle
     integer(c_int), value :: number
     type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
     name = c_null_ptr
-    associate (boundaries => loop%run%simulation%decomposition%boundaries)
-      if (number < 0 .or. number >= size(boundaries)) return
-      call put_text(boundaries(number + 1)%name, last_name)
-    end associate
+    call find_numbered(handle, number, loop, error)
+    if (told(error) /= 0) return
+    call put_text(loop%run%simulation%decomposition%boundaries(number + 1)%name, last_name)
     name = c_loc(last_name)
   end function gravier_boundary_name
 
@@ -180,10 +178,9 @@ contains
     type(error_t), allocatable :: error
     real(dp), allocatable :: found(:)
 
-    call c_f_pointer(handle, loop)
     values(:) = 0.0_dp
     n = 0
-    call check_boundary(loop, number, error)
+    call find_numbered(handle, number, loop, error)
     if (.not. allocated(error)) call get_boundary(loop, number + 1, text_of(name), found, error)
     if (.not. allocated(error)) then
       n = int(size(found), c_int)
@@ -204,8 +201,7 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call check_boundary(loop, number, error)
+    call find_numbered(handle, number, loop, error)
     if (.not. allocated(error)) call set_boundary(loop, number + 1, text_of(name), values, error)
     status = told(error)
   end function gravier_set_boundary
@@ -225,17 +221,19 @@ contains
     type(newcomers_t) :: bodies
     integer :: nd, k
 
-    call c_f_pointer(handle, loop)
-    nd = loop%run%simulation%decomposition%nd
-    allocate (bodies%radius(n), bodies%mass(n), bodies%material(n), bodies%position(nd, n), bodies%velocity(nd, n))
-    bodies%radius(:) = radius
-    bodies%mass(:) = mass
-    bodies%material(:) = material
-    do k = 1, n
-      bodies%position(:, k) = position((k - 1)*nd + 1:k*nd)
-      bodies%velocity(:, k) = velocity((k - 1)*nd + 1:k*nd)
-    end do
-    call add_bodies(loop, bodies, error)
+    call find_counted(handle, n, loop, error)
+    if (.not. allocated(error)) then
+      nd = loop%run%simulation%decomposition%nd
+      allocate (bodies%radius(n), bodies%mass(n), bodies%material(n), bodies%position(nd, n), bodies%velocity(nd, n))
+      bodies%radius(:) = radius
+      bodies%mass(:) = mass
+      bodies%material(:) = material
+      do k = 1, n
+        bodies%position(:, k) = position((k - 1)*nd + 1:k*nd)
+        bodies%velocity(:, k) = velocity((k - 1)*nd + 1:k*nd)
+      end do
+      call add_bodies(loop, bodies, error)
+    end if
     status = told(error)
   end function gravier_add_bodies
 
@@ -247,31 +245,50 @@ contains
     type(user_loop_t), pointer :: loop
     type(error_t), allocatable :: error
 
-    call c_f_pointer(handle, loop)
-    call remove_bodies(loop, id, error)
+    call find_counted(handle, n, loop, error)
+    if (.not. allocated(error)) call remove_bodies(loop, id, error)
     status = told(error)
   end function gravier_remove_bodies
 
-  subroutine check_subdomain(loop, subdomain, error)
-    type(user_loop_t), intent(in) :: loop
+  !> The run of a handle, which has a subdomain of this number, from 0, on this rank.
+  subroutine find_subdomain(handle, subdomain, loop, error)
+    type(c_ptr), intent(in) :: handle
     integer(c_int), intent(in) :: subdomain
+    type(user_loop_t), pointer, intent(out) :: loop
     type(error_t), allocatable, intent(inout) :: error
 
+    call find_loop(handle, loop, error)
+    if (allocated(error)) return
     associate (n => size(loop%run%simulation%decomposition%owned))
       if (subdomain < 0 .or. subdomain >= n) call raise(error, status_input, "subdomain "//to_text(subdomain)// &
         & ": this rank has "//to_text(n)//"; expected a number from 0 on")
     end associate
-  end subroutine check_subdomain
+  end subroutine find_subdomain
 
-  subroutine check_boundary(loop, number, error)
-    type(user_loop_t), intent(in) :: loop
+  !> The run of a handle, which has a boundary of this number, from 0.
+  subroutine find_numbered(handle, number, loop, error)
+    type(c_ptr), intent(in) :: handle
     integer(c_int), intent(in) :: number
+    type(user_loop_t), pointer, intent(out) :: loop
     type(error_t), allocatable, intent(inout) :: error
 
+    call find_loop(handle, loop, error)
+    if (allocated(error)) return
     associate (n => size(loop%run%simulation%decomposition%boundaries))
       if (number < 0 .or. number >= n) call raise(error, status_input, "boundary "//to_text(number)//": the scene has "// &
         & to_text(n)//"; expected a number from 0 on")
     end associate
-  end subroutine check_boundary
+  end subroutine find_numbered
+
+  !> The run of a handle, to which so many bodies are named.
+  subroutine find_counted(handle, n, loop, error)
+    type(c_ptr), intent(in) :: handle
+    integer(c_int), intent(in) :: n
+    type(user_loop_t), pointer, intent(out) :: loop
+    type(error_t), allocatable, intent(inout) :: error
+
+    call find_loop(handle, loop, error)
+    if (n < 0) call raise(error, status_input, "n = "//to_text(n)//" bodies: expected 0 or more")
+  end subroutine find_counted
 
 end module gravier_c_scene

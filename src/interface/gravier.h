@@ -1,7 +1,8 @@
 /* The loop of a run in the hands of a C or C++ program: link with libgravier. doc/loop.md describes it, in Python.
  *
  * Functions that return int return 0, or the exit status of an error: 2 bad input or a wrong call, 4 anything else. gravier_error()
- * then has its line. None ends the process, but for a system that gives no memory. "Collective": all ranks call together.
+ * then has its line. A simulation that is NULL, or closed, is a wrong call. None ends the process, but for a system that gives no
+ * memory. "Collective": all ranks call together.
  */
 #ifndef GRAVIER_H
 #define GRAVIER_H
@@ -64,8 +65,8 @@ int gravier_set_array(gravier_simulation *simulation, const char *name, int subd
 int gravier_set_gravity(gravier_simulation *simulation, const double *values, int n);
 int gravier_set_friction(gravier_simulation *simulation, double value);
 
-/* Boundaries, from 0. To read: position, normal, velocity, spin, force (of the grains on it, in the last step), applied_force, pressure,
- * friction. To set: velocity, spin, applied_force, pressure, friction. */
+/* Boundaries, from 0; NULL for a name is an error. To read: position, normal, velocity (of its pivot, else of its position), spin, force (of
+ * the grains on it, in the last step), applied_force, pressure, friction. To set: velocity, spin, applied_force, pressure, friction. */
 int gravier_boundary(gravier_simulation *simulation, const char *name, int *number);
 const char *gravier_boundary_name(gravier_simulation *simulation, int number);
 int gravier_get_boundary(gravier_simulation *simulation, int number, const char *name, double values[3], int *n);

@@ -363,6 +363,54 @@ with gravier.Simulation(case) as s:
         self.assert_status(unknown, 2)
         self.assertRegex(unknown.stderr, r"\Aloop: error: boundary 'roof': no boundary has this name; expected one of .*\n\Z")
 
+    def test_wrong_calls_in_c(self):
+        """A handle that is null or closed, a count below 0 and a number that no boundary has are errors with a line, and end no process."""
+        compiler = os.environ.get("CC") or shutil.which("cc")
+        if not compiler:
+            self.skipTest("there is no C compiler")
+        program = run_case(HEAP, directory=self.here("wrong_c"), options=("--check",))
+        with open(program.path("wrong.c"), "w", encoding="ascii") as file:
+            file.write("""
+#include <stdio.h>
+#include "gravier.h"
+#define TELL(call) do { int status = (call); printf("%d %s\\n", status, gravier_error()); } while (0)
+int main(void) {
+  gravier_simulation *none = NULL, *closed;
+  int64_t whole, shape[2];
+  double real, sum = 1.0;
+  const void *address;
+  int kind, number;
+  TELL(gravier_step(none));
+  TELL(gravier_close(none));
+  if (gravier_open("absent.nml", "wrong", GRAVIER_QUIET, NULL, &none) != 2 || none) return 1;
+  TELL(gravier_whole(none, "step", &whole));
+  TELL(gravier_real(none, "time", &real));
+  gravier_sum(none, 1, &sum);
+  if (gravier_open("case.nml", "wrong", GRAVIER_QUIET, NULL, &none)) return 1;
+  closed = none;
+  TELL(gravier_add_bodies(none, -1, NULL, NULL, NULL, NULL, NULL));
+  TELL(gravier_remove_bodies(none, -1, NULL));
+  TELL(gravier_boundary_name(none, 99) == NULL);
+  TELL(gravier_boundary_name(none, 0) == NULL);
+  TELL(gravier_close(none));
+  TELL(gravier_close(closed));
+  TELL(gravier_stop(closed, "late"));
+  TELL(gravier_array(closed, "position", 0, &address, shape, &kind));
+  TELL(gravier_boundary(closed, "floor", &number));
+  gravier_finalize();
+  return 0;
+}
+""")
+        subprocess.run([compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", "-I", os.path.join(SOURCE, "src/interface"), "wrong.c", "-o", "wrong",
+                        "-L", LIBRARY, "-lgravier", "-lm", "-Wl,-rpath," + LIBRARY], cwd=program.directory, check=True)
+        run = gravier("case.nml", directory=program.directory, program=program.path("wrong"))
+        self.assert_status(run, 0)
+        shut = "2 simulation: not open; expected one that gravier_open has opened, and that is not closed yet"
+        count = "2 n = -1 bodies: expected 0 or more"
+        lines = [line for line in run.stdout.splitlines() if line]
+        self.assertRegex(lines.pop(6), r"^1 boundary 99: the scene has \d+; expected a number from 0 on$")
+        self.assertEqual(lines, [shut] * 4 + [count] * 2 + ["0 "] * 2 + [shut] * 4)
+
     def test_communicators_of_mpi4py(self):
         try:
             import mpi4py  # noqa: F401

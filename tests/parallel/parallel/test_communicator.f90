@@ -1,7 +1,7 @@
 !> Collective operations: sums that do not depend on the ranks, errors that all agree on, blocks of subdomains.
 program test_communicator
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_is_nan, ieee_quiet_nan
-  use mpi_f08, only: MPI_COMM_SELF
+  use mpi_f08, only: MPI_COMM_SELF, MPI_COMM_NULL
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_random_hash, only: hash_uniform
@@ -43,8 +43,13 @@ contains
   !> A communicator by its handle.
   subroutine test_handle()
     type(communicator_t) :: own
+    type(error_t), allocatable :: wrong
 
-    call own%init_from(MPI_COMM_SELF%mpi_val)
+    call own%init_from(MPI_COMM_NULL%mpi_val, wrong)
+    call check(allocated(wrong), "no communicator")
+    if (allocated(wrong)) call check(wrong%status == status_input .and. &
+      & wrong%message == "communicator: MPI_COMM_NULL; expected one that has this process", "a line for no communicator")
+    call own%init_from(MPI_COMM_SELF%mpi_val, error)
     call check(own%size == 1 .and. own%rank == 0, "the communicator of a rank by itself, by its handle")
     call own%free()
   end subroutine test_handle
