@@ -2,7 +2,7 @@
 program test_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_stagnation, only: stagnation_t
+  use gravier_stagnation, only: stagnation_t, plain_may_help
   use gravier_defect_growth, only: defect_growth_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -17,6 +17,7 @@ program test_stagnation
   call check_equal(first_due(.true., 0.0_dp, 0.99999_dp), 1020, "one that falls by less than a tenth is")
   call check_equal(first_due(.true., 0.0_dp, 1.0001_dp, 0.9995_dp), 0, "no stagnation: the figure rises, the error falls")
   call check_equal(first_due(.true., 0.0_dp, 0.9995_dp, 1.0001_dp), 0, "no stagnation: the error rises, the figure falls")
+  call check_last()
   call check_growth()
   call finish_checks()
 
@@ -44,6 +45,26 @@ contains
       return
     end do
   end function first_due
+
+  !> Plain iterations that come last, after 1500 others, are as many and 2000 more, whatever they gain. They are tried where a load can
+  !> spread so far in them.
+  subroutine check_last()
+    type(stagnation_t) :: stagnation
+    real(dp) :: figures(2)
+    integer :: iteration, first
+    logical :: due
+
+    call stagnation%begin_last(1500)
+    first = 0
+    do iteration = 1510, 9000, 10
+      figures(:) = 0.9995_dp**iteration
+      call stagnation%note(problem, iteration, figures, .false., 0.0_dp, due)
+      if (due .and. first == 0) first = iteration
+    end do
+    call check_equal(first, 5000, "plain iterations that come last end, though they go on gaining")
+    call check(plain_may_help(1500, 144), "a load spreads over 144 contacts")
+    call check(.not. plain_may_help(1500, 145), "and over 145 it does not")
+  end subroutine check_last
 
   !> A defect that is five times its reference counts as growth after nine iterations above it, and never where it is mended.
   subroutine check_growth()
