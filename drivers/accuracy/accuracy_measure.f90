@@ -6,7 +6,7 @@ module gravier_accuracy_measure
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_config, only: config_t
-  use gravier_solve, only: solve_report_t
+  use gravier_solve_report, only: solve_report_t
   use gravier_simulation, only: simulation_t
   use gravier_accuracy_study, only: study_t
   use gravier_accuracy_motion, only: state_t, distance_t, exact_motion_t, compare_states, unknown

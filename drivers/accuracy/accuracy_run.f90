@@ -6,7 +6,7 @@ module gravier_accuracy_run
   use gravier_communicator, only: communicator_t
   use gravier_timers, only: clock
   use gravier_config, only: config_t
-  use gravier_solve, only: solve_report_t, solve_converged, solve_diverged
+  use gravier_solve_report, only: solve_report_t, solve_converged, solve_diverged
   use gravier_mean_stress, only: mean_stress_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_accuracy_motion, only: state_t, take_state, unknown

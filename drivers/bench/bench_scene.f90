@@ -9,7 +9,8 @@ module gravier_bench_scene
     & phase_reduction
   use gravier_nscdd, only: average_copies
   use gravier_method, only: work_t
-  use gravier_solve, only: solve_report_t, solve_contacts
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_report_t
   use gravier_file_system, only: make_directory, remove_directory
   use gravier_own_files, only: remove_own
   use gravier_simulation, only: simulation_t, step_figures_t

@@ -3,7 +3,7 @@ module gravier_columns_report
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_csv_writer, only: csv_writer_t
-  use gravier_solve, only: solve_report_t, solve_converged, solve_diverged
+  use gravier_solve_report, only: solve_report_t, solve_converged, solve_diverged
   use gravier_columns_study, only: column_t, method_t, methods, sweep_counts
   implicit none
   private

@@ -3,7 +3,7 @@ module gravier_columns_study
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
-  use gravier_solve, only: solve_report_t
+  use gravier_solve_report, only: solve_report_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   implicit none

@@ -8,7 +8,7 @@ module gravier_columns_tables
   use gravier_own_files, only: check_own_files
   use gravier_table_place, only: check_table_place
   use gravier_output_lock, only: output_lock_t
-  use gravier_solve, only: solve_report_t, solve_converged
+  use gravier_solve_report, only: solve_report_t, solve_converged
   use gravier_columns_options, only: options_t
   use gravier_columns_study, only: column_t, paper_columns, solve_columns
   use gravier_columns_report, only: write_table, write_csv

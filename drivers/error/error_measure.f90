@@ -6,7 +6,8 @@ module gravier_error_measure
   use gravier_timers, only: clock
   use gravier_communicator, only: communicator_t
   use gravier_velocity_error, only: velocity_error_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, by_velocity
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_report_t, by_velocity
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_error_plan, only: plan_t, reference_t, row_t, start_cold
   use gravier_error_fields, only: field_t, set_impulses, take_fields, take_velocities, mass_of, distance

@@ -3,7 +3,8 @@ module gravier_error_reference
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_velocity_error, only: velocity_error_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, by_residual
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_report_t, by_residual
   use gravier_simulation, only: simulation_t
   use gravier_error_plan, only: plan_t, reference_t, row_t
   use gravier_error_fields, only: field_t, take_velocities, scale_of, mass_of, distance

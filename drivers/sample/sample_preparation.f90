@@ -6,7 +6,7 @@ module gravier_sample_preparation
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_set_t
-  use gravier_solve, only: solve_converged, solve_diverged
+  use gravier_solve_report, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_load_areas, only: facing_area
   use gravier_scene_extent, only: find_extent

@@ -1,7 +1,7 @@
 !> When the grains of a sample are at rest.
 module gravier_sample_rest
   use gravier_kinds, only: dp
-  use gravier_solve, only: solve_converged
+  use gravier_solve_report, only: solve_converged
   use gravier_load_areas, only: facing_area
   use gravier_simulation, only: simulation_t, step_figures_t
   implicit none

@@ -4,7 +4,7 @@ module gravier_step_figures
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
   use gravier_finite, only: is_finite
-  use gravier_solve, only: solve_report_t
+  use gravier_solve_report, only: solve_report_t
   use gravier_decomposition, only: decomposition_t
   use gravier_interface, only: interface_statistics_t
   use gravier_given_impulses, only: started_t

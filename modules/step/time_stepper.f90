@@ -10,8 +10,8 @@ module gravier_time_stepper
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
   use gravier_backoff, only: backoff_t
-  use gravier_solve, only: solve_control_t, solve_watch_t, exact_solution_t, solve_contacts, solve_converged, &
-    & solve_diverged, solve_unbounded
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged, solve_unbounded
   use gravier_fallback, only: fallback_t
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, remove_grains, drop_grains

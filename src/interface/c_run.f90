@@ -7,7 +7,7 @@ module gravier_c_run
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_abandon, only: end_all_ranks
   use gravier_communicator, only: join_parallel, stop_parallel
-  use gravier_solve, only: solve_converged
+  use gravier_solve_report, only: solve_converged
   use gravier_run_tally, only: relative_error
   use gravier_user_loop, only: user_loop_t
   use gravier_c_handle, only: is_open, keep_open, forget_open, find_loop

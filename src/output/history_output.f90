@@ -4,7 +4,7 @@ module gravier_history_output
   use gravier_errors, only: error_t
   use gravier_schedule, only: schedule_t
   use gravier_csv_writer, only: csv_writer_t, csv_option_t
-  use gravier_solve, only: solve_converged
+  use gravier_solve_report, only: solve_converged
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, of_each_step

@@ -9,7 +9,7 @@ module gravier_run_log
   use gravier_file_system, only: terminal_width
   use gravier_text_file, only: text_file_t
   use gravier_method, only: work_t
-  use gravier_solve, only: solve_watch_t, solve_report_t, solve_converged, solve_diverged
+  use gravier_solve_report, only: solve_watch_t, solve_report_t, solve_converged, solve_diverged
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory

@@ -2,7 +2,7 @@
 module gravier_step_lines
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
-  use gravier_solve, only: solve_report_t, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_solve_report, only: solve_report_t, solve_diverged, solve_stagnated, solve_unbounded
   use gravier_interface, only: interface_statistics_t, n_multiplicities
   use gravier_config_types, only: solver_config_t
   use gravier_simulation, only: simulation_t, step_figures_t

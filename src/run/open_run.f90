@@ -14,7 +14,7 @@ module gravier_open_run
   use gravier_own_files, only: check_own_files, forget_own_files
   use gravier_output_lock, only: output_lock_t
   use gravier_load_areas, only: check_load_areas
-  use gravier_solve, only: solve_converged, solve_diverged
+  use gravier_solve_report, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
   use gravier_simulation, only: simulation_t, step_figures_t

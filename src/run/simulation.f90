@@ -8,7 +8,7 @@ module gravier_simulation
   use gravier_schedule, only: schedule_t
   use gravier_time_table, only: time_table_t
   use gravier_neighbour_rule, only: rule_dual, rule_primal
-  use gravier_solve, only: by_velocity, by_residual, by_error
+  use gravier_solve_report, only: by_velocity, by_residual, by_error
   use gravier_body_store, only: body_set_t
   use gravier_repartition, only: repartition_rule_t, divide
   use gravier_boundary_loads, only: set_glued_velocities

@@ -4,7 +4,7 @@ module gravier_column_solution
   use gravier_narrow, only: narrow
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_solve, only: exact_solution_t
+  use gravier_solve_report, only: exact_solution_t
   implicit none
   private
   public :: column_solution_t

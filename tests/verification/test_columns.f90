@@ -7,7 +7,7 @@ program test_columns
   use gravier_communicator, only: communicator_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
-  use gravier_solve, only: solve_converged
+  use gravier_solve_report, only: solve_converged
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none

@@ -10,7 +10,8 @@ program test_compliance_starts
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_contact_data, only: lane_of, block_of
   use gravier_contact_kernels, only: project_on_cones
-  use gravier_solve, only: solve_contacts, solve_report_t, solve_converged
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_report_t, solve_converged
   use gravier_check, only: check, check_close, finish_checks
   implicit none
   character(len=*), parameter :: newline = new_line("a")

@@ -8,10 +8,10 @@
 !>
 !>     0 <= z.v = z.W r + z.q,   -z.q <= r.W^T z <= max(s |r|) sum(|W^T z|/s),
 !>
-!> s the stiffness of each contact. Loads that do not grow need max(s |r|) >= -z.q/sum(|W^T z|/s) =: B max|q|. A heavy body on a light
-!> one needs a B of their ratio of masses. Where B is beyond what loads make in other problems, and what is left of W^T z besides is
-!> no more than roundings may be, this proves that there is no solution. With friction in z it does not: z.v may be negative where
-!> contacts slip. Then it marks iterations that grow for ever, as long as contacts keep their states.
+!> s the stiffness of each contact. Loads that do not grow need max(s |r|) >= -z.q/sum(|W^T z|/s) =: B max|q|. A heavy body on a
+!> light one needs a B of their ratio of masses. Where B is beyond what loads make in other problems, and what is left of W^T z
+!> besides is no more than roundings may be, this proves that there is no solution. With friction in z it does not: z.v may be
+!> negative where contacts slip. Then it marks iterations that grow for ever, as long as contacts keep their states.
 module gravier_unbounded
   use gravier_kinds, only: dp
   use gravier_delassus, only: delassus_t, most_impulse

@@ -9,8 +9,9 @@ module gravier_fallback
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_method, only: method_t
   use gravier_backoff, only: backoff_t, backoff_words, backoff_record
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_contacts, &
-    & solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, solve_converged, &
+    & solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
   implicit none
   private
   public :: fallback_t, fallback_words, fallback_record

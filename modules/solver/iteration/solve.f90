@@ -20,8 +20,6 @@ module gravier_solve
   implicit none
   private
   public :: solve_contacts
-  public :: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, by_velocity, by_residual, by_error
-  public :: solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
 
   !> What a solve carries along.
   type :: solve_state_t

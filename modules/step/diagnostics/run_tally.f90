@@ -5,7 +5,8 @@ module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_creeping_groups, only: creep_t
   use gravier_interface, only: interface_statistics_t
-  use gravier_solve, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, solve_unbounded
+  use gravier_solve_report, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, &
+    & solve_unbounded
   implicit none
   private
   public :: run_tally_t, relative_error, far_off, often_mended

@@ -18,7 +18,8 @@ module free_plate
   use gravier_nscdd_ep, only: nscdd_ep_t
   use gravier_interface_direct, only: interface_direct_t
   use gravier_interface_cg, only: interface_cg_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_converged
   use gravier_test_contact_columns, only: pack_columns, pack_pairs
   use gravier_check, only: check, check_close, check_equal
   implicit none

@@ -8,7 +8,8 @@ program test_nscdd
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: average_copies
-  use gravier_solve, only: solve_report_t, solve_contacts, solve_converged
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_report_t, solve_converged
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_lattice, iterate, same_bits, same_impulses, compare_with_one_rank
   use gravier_check, only: check, check_close, check_equal, finish_checks

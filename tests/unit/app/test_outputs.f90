@@ -9,7 +9,7 @@ program test_outputs
   use gravier_hdf5_file, only: h5_file_t
   use gravier_bodies_file, only: bodies_data_t, read_bodies
   use gravier_fclib_file, only: fclib_local_t, fclib_global_t, read_fclib
-  use gravier_solve, only: solve_converged, solve_exhausted
+  use gravier_solve_report, only: solve_converged, solve_exhausted
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, after_solve, of_each_step, of_states, of_checkpoints, of_end

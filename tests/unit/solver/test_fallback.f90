@@ -61,7 +61,8 @@ program test_fallback
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_nlgs, only: nlgs_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_converged, solve_exhausted, solve_stagnated, solve_unbounded
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_converged, solve_exhausted, solve_stagnated, &
+    & solve_unbounded
   use gravier_fallback, only: fallback_t, fallback_words
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t

@@ -7,7 +7,7 @@ module test_solve_schemes
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t
   use gravier_method_options, only: method_features_t
-  use gravier_solve, only: exact_solution_t
+  use gravier_solve_report, only: exact_solution_t
   implicit none
   private
   public :: growing_t, first_impulse_t
@@ -91,7 +91,8 @@ program test_solve
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_nlgs, only: nlgs_t
-  use gravier_solve, only: solve_control_t, solve_report_t, solve_contacts, solve_converged, solve_exhausted, solve_diverged, &
+  use gravier_solve, only: solve_contacts
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_converged, solve_exhausted, solve_diverged, &
     & solve_stagnated, solve_unbounded, by_velocity, by_error
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t

@@ -7,7 +7,7 @@ program test_time_stepper
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_time_table, only: time_table_t
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_solve, only: solve_report_t, solve_converged, solve_stagnated, solve_diverged
+  use gravier_solve_report, only: solve_report_t, solve_converged, solve_stagnated, solve_diverged
   use gravier_repartition, only: repartition_rule_t, repartition_is_due
   use gravier_load_areas, only: facing_area, find_load_areas
   use gravier_body_motion, only: move_to_middle, move_to_end, drive
