@@ -2,12 +2,12 @@
 !>
 !> A residual is relative to the impulses, and small for two reasons: contacts nearly obey their laws, or impulses have grown. Where
 !> walls close on grains, impulses grow without bound and the residual falls as one over them. It is relative to the largest
-!> impulses, too, and does not see light bodies beside heavy ones, nor new contacts beside loaded ones. Where everything prescribed is
-!> at rest, the residual alone ends a solve all the same: impulses do not grow there, and the closing lines of a run tell of velocities
-!> that are far off. Elsewhere a small residual ends a solve only if velocities are not far beyond the accuracy: no contact may
-!> violate its law by more than the default criterion allows, nor the velocity error that it compares be above `far` times the
-!> accuracy. Iterations go on otherwise, until that holds or impulses are seen to grow in vain (gravier_vain_impulses). Walls that
-!> close by less than the accuracy are no contradiction for it.
+!> impulses, too, and does not see light bodies beside heavy ones, nor new contacts beside loaded ones. Where everything prescribed
+!> is at rest, the residual alone ends a solve all the same: impulses do not grow there, and the closing lines of a run tell of
+!> velocities that are far off. Elsewhere a small residual ends a solve only if velocities are not far beyond the accuracy: no
+!> contact may violate its law by more than the default criterion allows, nor the velocity error that it compares be above `far`
+!> times the accuracy. Iterations go on otherwise, until that holds or impulses are seen to grow in vain (gravier_vain_impulses).
+!> Walls that close by less than the accuracy are no contradiction for it.
 module gravier_residual_verdict
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t

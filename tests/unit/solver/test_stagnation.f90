@@ -46,8 +46,8 @@ contains
     end do
   end function first_due
 
-  !> Plain iterations that come last, after 1500 others, are as many and 2000 more, whatever they gain. They are tried where a load can
-  !> spread so far in them.
+  !> Plain iterations that come last, after 1500 others, are as many and 2000 more, whatever they gain. They are tried where a load
+  !> can spread so far in them.
   subroutine check_last()
     type(stagnation_t) :: stagnation
     real(dp) :: figures(2)
