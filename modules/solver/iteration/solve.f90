@@ -10,7 +10,7 @@ module gravier_solve
   use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_check_schedule, only: check_schedule_t, growth_limit
   use gravier_defect_growth, only: defect_growth_t
-  use gravier_stagnation, only: stagnation_t, plain_may_help
+  use gravier_stagnation, only: stagnation_t
   use gravier_layer_trial, only: layer_trial_t
   use gravier_fresh_start, only: fresh_start_t
   use gravier_solve_report, only: solve_control_t, solve_report_t, exact_solution_t, solve_watch_t, n_traced, by_velocity, &
@@ -341,7 +341,7 @@ contains
   subroutine judge_stagnation(state, problem, method, control, report, has_stagnated)
     type(solve_state_t), intent(inout) :: state
     type(contact_problem_t), intent(inout) :: problem
-    class(method_t), intent(inout) :: method
+    class(method_t), intent(in) :: method
     type(solve_control_t), intent(in) :: control
     type(solve_report_t), intent(inout) :: report
     logical, intent(out) :: has_stagnated
@@ -364,7 +364,7 @@ contains
       has_stagnated = .false.
       call state%stagnation%go_on(problem, report%iterations)
     else if (has_stagnated .and. method%acceleration%extrapolates() .and. &
-      & plain_may_help(report%iterations, state%velocity%levels%most_depth)) then
+      & state%stagnation%may_begin_last(report%iterations, state%velocity%levels%most_depth)) then
       has_stagnated = .false.
       state%ends_momentum = .true.
     else if (has_stagnated) then

@@ -12,7 +12,7 @@ module gravier_stagnation
   use gravier_creeping_groups, only: creep_t, find_creep
   implicit none
   private
-  public :: stagnation_t, plain_may_help
+  public :: stagnation_t
 
   !> what is left of the figure where a solve has gained something
   real(dp), parameter :: gained = 0.9_dp
@@ -40,6 +40,7 @@ module gravier_stagnation
     procedure :: judge => stagnation_judge
     procedure :: describe => stagnation_describe
     procedure :: go_on => stagnation_go_on
+    procedure :: may_begin_last => stagnation_may_begin_last
     procedure :: begin_last => stagnation_begin_last
   end type stagnation_t
 
@@ -116,13 +117,15 @@ contains
     call keep_impulses(self, problem, iteration)
   end subroutine stagnation_go_on
 
-  !> Whether plain iterations may bring what accelerated ones do not, in the number that they would have.
-  pure logical function plain_may_help(iteration, depth)
+  !> Whether plain iterations, which were not tried before, may bring what accelerated ones do not, in the number that they would
+  !> have.
+  pure logical function stagnation_may_begin_last(self, iteration, depth) result(may_begin)
+    class(stagnation_t), intent(in) :: self
     integer, intent(in) :: iteration
     !> of the problem, in contacts
     integer, intent(in) :: depth
-    plain_may_help = real(depth, dp)**2 <= waves*real(plain_patience + iteration, dp)
-  end function plain_may_help
+    may_begin = .not. self%is_last .and. real(depth, dp)**2 <= waves*real(plain_patience + iteration, dp)
+  end function stagnation_may_begin_last
 
   !> The method goes on in another way, by plain iterations, which have as many as the solve has had, and some more. They are slow
   !> but gain something for ever, so that what they gain is no reason to wait for longer.

@@ -2,7 +2,7 @@
 program test_stagnation
   use gravier_kinds, only: dp
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_stagnation, only: stagnation_t, plain_may_help
+  use gravier_stagnation, only: stagnation_t
   use gravier_defect_growth, only: defect_growth_t
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
@@ -54,7 +54,10 @@ contains
     integer :: iteration, first
     logical :: due
 
+    call check(stagnation%may_begin_last(1500, 144), "a load spreads over 144 contacts")
+    call check(.not. stagnation%may_begin_last(1500, 145), "and over 145 it does not")
     call stagnation%begin_last(1500)
+    call check(.not. stagnation%may_begin_last(1500, 1), "the last iterations come once")
     first = 0
     do iteration = 1510, 9000, 10
       figures(:) = 0.9995_dp**iteration
@@ -62,8 +65,6 @@ contains
       if (due .and. first == 0) first = iteration
     end do
     call check_equal(first, 5000, "plain iterations that come last end, though they go on gaining")
-    call check(plain_may_help(1500, 144), "a load spreads over 144 contacts")
-    call check(.not. plain_may_help(1500, 145), "and over 145 it does not")
   end subroutine check_last
 
   !> A defect that is five times its reference counts as growth after nine iterations above it, and never where it is mended.
