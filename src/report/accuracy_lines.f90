@@ -6,7 +6,8 @@ module gravier_accuracy_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, creep_lines, goal_name, percent, plain
+  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, creep_lines, goal_name, goal_text, &
+    & percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 
@@ -31,6 +32,19 @@ contains
     name = "tolerance"
     if (simulation%config%solver%criterion == "velocity_error") name = "accuracy"
   end function goal_name
+
+  !> The goal of a solve with its number, or with another one: so many times it.
+  function goal_text(simulation, times) result(text)
+    type(simulation_t), intent(in) :: simulation
+    real(dp), intent(in), optional :: times
+    character(len=:), allocatable :: text
+    real(dp) :: goal
+
+    goal = simulation%config%solver%tolerance
+    if (goal_name(simulation) == "accuracy") goal = simulation%config%solver%accuracy
+    if (present(times)) goal = times*goal
+    text = goal_name(simulation)//" "//to_text(goal, 3)
+  end function goal_text
 
   !> What the criterion has left at worst, and what else is known of the error.
   function error_line(simulation) result(text)

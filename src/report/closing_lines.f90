@@ -10,7 +10,7 @@ module gravier_closing_lines
   use gravier_simulation, only: simulation_t
   use gravier_memory_report, only: peak_memory
   use gravier_run_summary, only: converged_text, mending_text, time_text, halving_text
-  use gravier_accuracy_lines, only: goal_name
+  use gravier_accuracy_lines, only: goal_name, goal_text
   use gravier_step_lines, only: balance_text
   implicit none
   private
@@ -113,10 +113,10 @@ contains
         & counted(effort%iterations, "iteration")//" in all"//newline
       if (effort%iterations == 0) return
       call effort%looser_range(least, most)
-      text = text//"            at ten times the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
+      text = text//"            at "//goal_text(simulation, 10.0_dp)//": "//estimate_text(comm, effort, least, most)
       if (effort%unreached(tenfold) > 0) text = text//": "//counted(effort%unreached(tenfold), "solve")//" did not reach it"
       call effort%tighter_range(least, most)
-      text = text//newline//"            at a tenth of the "//goal_name(simulation)//" "//estimate_text(comm, effort, least, most)
+      text = text//newline//"            at "//goal_text(simulation, 0.1_dp)//": "//estimate_text(comm, effort, least, most)
       if (simulation%failed > 0) then
         text = text//": "//counted(int(simulation%failed, i8), "solve")//" did not reach the "//goal_name(simulation)//" itself"
       else if (least < 0.0_dp) then

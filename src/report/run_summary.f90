@@ -7,7 +7,7 @@ module gravier_run_summary
   use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
-  use gravier_accuracy_lines, only: goal_name, percent, plain
+  use gravier_accuracy_lines, only: goal_name, goal_text, percent, plain
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -97,15 +97,6 @@ contains
       end if
     end associate
   end function mending_text
-
-  !> The goal of a solve with its number.
-  function goal_text(simulation) result(text)
-    type(simulation_t), intent(in) :: simulation
-    character(len=:), allocatable :: text
-
-    text = "tolerance "//to_text(simulation%config%solver%tolerance, 3)
-    if (goal_name(simulation) == "accuracy") text = "accuracy "//to_text(simulation%config%solver%accuracy, 3)
-  end function goal_text
 
   !> Whether solves reached a criterion that does not tell the velocity error, and are not known to be within the accuracy.
   pure logical function is_doubtful(simulation)
@@ -292,7 +283,7 @@ contains
       else if (overlaps_grew(simulation)) then
         text = "nothing yet: overlaps grow; first choose a smaller &time step or &solver "//goal_name(simulation)
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
-        text = "ten times the "//goal_name(simulation)//": "//duration_text(rest + looser_seconds(2))//" to "// &
+        text = goal_text(simulation, 10.0_dp)//", which is looser: "//duration_text(rest + looser_seconds(2))//" to "// &
           & duration_text(rest + looser_seconds(3))//" in all (estimated)"
       else if (phases(phase_factorise) + phases(phase_interface_solve) > half .and. simulation%fallback%taken > 0 .and. &
         & .not. simulation%physics%laws%yields) then

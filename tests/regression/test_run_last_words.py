@@ -175,7 +175,7 @@ class LastWords(RunTestCase):
                                                  r"            the largest group of them joins \d+ grains by \d+ contacts?\n"
                                                  r"            velocities in such a group differ by up to \d\.\dE-1\d of U between iterates")
                 self.assertIn("*** 2 of the steps did NOT reach the accuracy: the accuracy of the results is not known", line(run, "finished"))
-                self.assertRegex(run.stdout, "at a tenth of the accuracy not known: 2 solves did not reach the accuracy itself")
+                self.assertRegex(run.stdout, r"at accuracy \S+: not known: 2 solves did not reach the accuracy itself")
                 self.assertNotRegex(line(run, "to halve it"), "ten times|longer|looser|larger &time")
 
     def test_wrong_velocities(self):
@@ -191,7 +191,7 @@ class LastWords(RunTestCase):
         found = re.search(r"residual at most (\S+) at the end of a solve, tolerance 3\.00E-02; velocity error at most (\S+) of U", run.stdout)
         self.assertAlmostEqual(float(found[1]) / history["residual"].max(), 1.0, delta=6e-3)
         self.assertAlmostEqual(float(found[2]) / worst.max(), 1.0, delta=6e-3)
-        self.assertNotRegex(line(run, "to halve it"), "ten times|longer")
+        self.assertNotRegex(line(run, "to halve it"), "looser|longer")
         # sweeps may wander above this tolerance for thousands of iterations
         newton = {"method": "newton", "criterion": "residual", "tolerance": 1e-6, "acceleration": None}
         right = run_case(merged(self.rest, {"solver": newton}), 1, self.here("right"))
@@ -242,7 +242,7 @@ class LastWords(RunTestCase):
                            self.here(f"advice {accuracy}"))
             with self.subTest(accuracy):
                 self.assert_status(run, 0)
-                self.assertEqual(bool(re.search("ten times the accuracy|longer &time", line(run, "to halve it"))), may, run.stdout)
+                self.assertEqual(bool(re.search("which is looser|longer &time", line(run, "to halve it"))), may, run.stdout)
 
     def test_growing_overlaps(self):
         """Grains sink into each other that loose solves do not hold: the advice is a smaller step or accuracy."""
