@@ -42,9 +42,7 @@ contains
     loop => open_loop
     known = c_null_ptr
     if (associated(open_loop)) known = c_loc(open_loop)
-    if (c_associated(known)) then
-      if (c_associated(handle, known)) return
-    end if
+    if (c_associated(handle, known)) return
     call raise(error, status_input, "simulation: not open; expected one that gravier_open has opened, and that is not closed yet")
   end subroutine find_loop
 
