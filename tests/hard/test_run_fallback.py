@@ -133,6 +133,10 @@ class Fallback(RunTestCase):
             self.assertIn(run.status, (0, 3))
             missed += (run.history()["converged"] == 0).sum()
         self.assertLess(missed, 36)
+        # plain sweeps that are cut off come after solves that have stagnated
+        run = self.play("spheres cut off", ("\n".join(["id,x,y,z,radius,vx", *lines]) + "\n", case), {"solver": {"max_iterations": 1500}})
+        self.assert_status(run, 3)
+        self.assertRegex(run.stdout, r"\nconverged   NO: .*\d+ stagnated")
 
     def test_limits(self):
         """Problems with more contacts than `fallback_contacts` are left as they are, and the log says which key to change."""
