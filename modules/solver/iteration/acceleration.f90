@@ -14,8 +14,8 @@ module gravier_acceleration
   real(dp), parameter :: growth_allowed = 1.02_dp
   !> least 1 - beta after an idle phase; its factor after a window that grew, and after one that shrank
   real(dp), parameter :: wary_margin = 0.3_dp, widen = 3.0_dp, narrow = 0.7_dp
-  !> iterations without progress after which momentum begins anew; so often before plain iterations come; ratio of window sums
-  !> taken for progress
+  !> iterations without progress after which momentum begins anew; how often it does so before plain iterations come; ratio of
+  !> window sums taken for progress
   integer, parameter :: idle_limit = 200, most_starts = 3
   real(dp), parameter :: progress_made = 0.8_dp
   !> How strongly acceleration answers to growth.
@@ -174,7 +174,7 @@ contains
     whole = self%resting .or. self%iterations - self%before < self%steering%window
   end function acceleration_whole
 
-  !> Whether this solve is accelerated, be it between plain iterations.
+  !> Whether momentum is in use in this solve, or comes back after plain iterations.
   pure logical function acceleration_extrapolates(self) result(extrapolates)
     class(acceleration_t), intent(in) :: self
     extrapolates = self%on .and. .not. self%has_ended
