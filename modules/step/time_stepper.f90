@@ -115,8 +115,7 @@ module gravier_time_stepper
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
     real(dp) :: reached_imbalance = 0.0_dp
-    !> of the last step [m]
-    real(dp) :: largest_overlap = 0.0_dp
+    real(dp) :: largest_overlap = 0.0_dp ! of the last step [m]
     ! ---- what is noted
     !> figures that the user asked for, and the steps whose states are written, which some of them wait for
     type(diagnostics_t) :: diagnostics
@@ -267,7 +266,8 @@ contains
     type(step_figures_t), intent(inout) :: figures
     integer :: s
 
-    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%cell)
+    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, &
+      & self%time + self%physics%h, self%physics%cell)
     call build_problem(self%decomposition, self%halo, self%problem%kernels, self%physics, self%problem, &
       & figures%interface_statistics)
     call start_timer(phase_setup)

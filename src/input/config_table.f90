@@ -114,6 +114,10 @@ module gravier_config_table
      key_t("scene", "cell_shear_stress", kind_real, "3*0", "", &
            "shear stresses that drive the shear of the period, 0: the rate of shear is given; one entry in 2D", &
            count=3, planar=1, unit="Pa, N/m in 2D"), &
+     key_t("scene", "cell_table", kind_text, "''", "", &
+           "path of a CSV file with the column `time` and any of those of the moving cell, such as `strain_rate_x`, "// &
+           "`shear_rate_xy`, `pressure_x` and `shear_stress_xy`, which replaces rates and stresses of the period: linear in "// &
+           "time between its rows, constant outside"), &
      key_t("scene", "cell_inertia", kind_real, "0.1", "> 0", &
            "inertia of the period that stresses drive, over the mass of the grains times the square of its length"), &
      key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &

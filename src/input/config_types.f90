@@ -60,8 +60,8 @@ module gravier_config_types
     real(dp) :: cell_strain_rate(3), cell_shear_rate(3), cell_pressure(3), cell_shear_stress(3), cell_inertia
     !> N/m^3 (N/m^2 in 2D); the third component is 0 in 2D
     real(dp) :: body_force(3)
-    !> CSV table of the gravity in time; blank: none
-    character(len=text_length) :: gravity_table
+    !> CSV tables in time, of the gravity and of what moves the periodic cell; blank: none
+    character(len=text_length) :: gravity_table, cell_table
     !> m; negative when not given, see alert_distance_given
     real(dp) :: alert_distance
     !> false: the alert distance is 0.1 of the largest radius

@@ -115,6 +115,10 @@ contains
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin
       data%period(:) = decomposition%period%length
+      data%has_edges = decomposition%period%moves
+      data%tilt(:) = decomposition%period%tilt
+      data%length_rate(:) = decomposition%period%length_rate
+      data%tilt_rate(:) = decomposition%period%tilt_rate
       if (allocated(simulation%problem%sub)) then
         if (with_forces) call list_forces(simulation%problem, decomposition, simulation%halo, simulation%physics%h, data%contacts)
       else if (simulation%restarted) then

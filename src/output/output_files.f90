@@ -39,6 +39,7 @@ contains
       if (config%scene%bodies == "file") call check_input(config%scene%bodies_file, "&scene bodies_file")
       call check_input(config%scene%shapes, "&scene shapes")
       call check_input(config%scene%gravity_table, "&scene gravity_table")
+      call check_input(config%scene%cell_table, "&scene cell_table")
       call check_input(config%sample%radius_table, "&sample radius_table")
       do b = 1, size(config%boundaries)
         call check_input(config%boundaries(b)%table, "&boundary '"//trim(config%boundaries(b)%name)//"' table")

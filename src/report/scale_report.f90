@@ -177,6 +177,7 @@ contains
     text = ""
     least = least_kept
     call look(simulation%gravity_table, "&scene gravity_table = '"//trim(simulation%config%scene%gravity_table)//"'")
+    call look(simulation%cell_drive%table, "&scene cell_table = '"//trim(simulation%config%scene%cell_table)//"'")
     do b = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(b))
         call look(boundary%table, "boundary '"//boundary%name//"': its table")

@@ -140,6 +140,7 @@ contains
         & simulation%inflow%insertions(b)%radii%digest())
     end do
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
+    call add_table(simulation%cell_drive%table, trim(simulation%config%scene%cell_table))
     do b = 1, size(simulation%config%boundaries)
       associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))
         call add_table(boundary%table, trim(given%table))

@@ -118,6 +118,7 @@ contains
     since = (simulation%step - steps_at_rest)*simulation%physics%h
     rests = .not. simulation%inflow%awaits(simulation%time)
     if (allocated(simulation%gravity_table%has)) rests = rests .and. .not. simulation%gravity_table%changes_after(since)
+    if (allocated(simulation%cell_drive%table%has)) rests = rests .and. .not. simulation%cell_drive%table%changes_after(since)
     do b = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(b))
         rests = rests .and. .not. (boundary%remove_at > since .and. boundary%remove_at < huge(1.0_dp))

@@ -21,7 +21,6 @@ module gravier_simulation
   use gravier_scene_thickness, only: mean_half_thickness
   use gravier_scene, only: scene_t, make_scene
   use gravier_scene_period, only: check_in_period
-  use gravier_scene_cell, only: make_cell_drive
   use gravier_diagnostic_registry, only: diagnostic_holder_t
   use gravier_scene_regions, only: make_region_means
   use gravier_method_choice, only: choose_scheme, choose_fallback
@@ -134,7 +133,7 @@ contains
     call self%decomposition%figures%init(scene%shapes)
     ! one subdomain until it is known that the scene has room for so many
     call self%decomposition%init(comm, 1, scene%grains, scene%period)
-    call make_cell_drive(config%scene, self%cell_drive)
+    self%cell_drive = scene%cell_drive
     call self%velocity_scale%init(comm, scene%grains, scene%boundaries, config%time%steps*config%time%step, &
       & merge(config%solver%velocity_scale, 0.0_dp, config%solver%velocity_scale_given))
     if (self%inflow%exists()) call prepare_inflow(self)
@@ -165,7 +164,8 @@ contains
     call self%start_diagnostics()
     self%mass = self%decomposition%free_mass()
     self%first_mass = self%mass
-    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%cell)
+    call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, self%physics%h, &
+      & self%physics%cell)
     call self%population%note(self%n_grains - self%n_glued, self%mass)
   end subroutine simulation_start
 

@@ -21,7 +21,8 @@ module gravier_scene
   use gravier_law_set, only: law_set_t
   use gravier_pair_laws, only: set_default_laws
   use gravier_method_choice, only: check_moments
-  use gravier_scene_cell, only: cell_moves, check_cell
+  use gravier_cell_drive, only: cell_drive_t
+  use gravier_scene_cell, only: make_cell_drive, set_period, stop_cell, check_cell
   use gravier_known_column, only: what_else_acts
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
@@ -50,6 +51,8 @@ module gravier_scene
     !> of grains that enter
     type(insertion_t), allocatable :: insertions(:)
     type(period_t) :: period
+    !> what moves it
+    type(cell_drive_t) :: cell_drive
     !> grains of all ranks, and those of them that are glued to boundaries
     integer(i8) :: n_grains = 0, n_glued = 0
     !> the largest identifier of grains and boundaries
@@ -101,12 +104,13 @@ contains
     call make_boundaries(comm, config, data, scene%boundaries, error)
     if (allocated(error)) return
     scene%n_walls = data%n_walls
-    call set_period(config%scene, data, scene)
+    call set_period(config, data, scene%period, error)
     do b = 1, size(scene%boundaries)
       scene%boundaries(b)%period(:) = scene%period%length
     end do
     call check_pressures(config%file, config%scene%dimension, scene%period%length, scene%boundaries, error)
-    call check_cell(config, scene%period, size(scene%boundaries), error)
+    if (.not. allocated(error)) call make_cell_drive(config, scene%cell_drive, error)
+    if (.not. allocated(error)) call check_cell(config, scene%cell_drive, scene%period, size(scene%boundaries), error)
     call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
     call check_mean_regions(config, scene%period, error)
     call comm%agree(error)
@@ -120,6 +124,7 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
+    if (.not. scene%period%moves) call stop_cell(scene%period, scene%grains)
     call check_moments(config, scene%effects, error)
     call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)
@@ -128,20 +133,6 @@ contains
     if (scene%effects%shapes .or. has_facets(scene%boundaries)) call check_points(scene%contacts, error)
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
-
-  !> The period of the input file, else that of the bodies file.
-  subroutine set_period(config, data, scene)
-    type(scene_config_t), intent(in) :: config
-    type(bodies_data_t), intent(in) :: data
-    type(scene_t), intent(inout) :: scene
-
-    scene%period%moves = cell_moves(config)
-    scene%period%length(:) = config%period
-    scene%period%origin(:) = config%period_origin
-    if (scene%period%on() .or. .not. data%has_box) return
-    scene%period%length(:) = data%period
-    scene%period%origin(:) = data%origin
-  end subroutine set_period
 
   !> Refuse places so far from the origin that rounding would hide the gaps between grains. Errors are the same on all ranks.
   !> Collective.

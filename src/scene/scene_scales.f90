@@ -4,6 +4,7 @@ module gravier_scene_scales
   use gravier_motion, only: grain_volume
   use gravier_boundary, only: boundary_t
   use gravier_physics, only: physics_t
+  use gravier_cell_drive, only: cell_drive_t
   use gravier_velocity_scale, only: imposed_motion_t
   use gravier_load_areas, only: find_load_areas
   use gravier_simulation, only: simulation_t
@@ -151,6 +152,7 @@ contains
     end_time = simulation%config%time%steps*simulation%config%time%step
     room = 2
     if (allocated(simulation%gravity_table%time)) room = room + size(simulation%gravity_table%time)
+    if (allocated(simulation%cell_drive%table%time)) room = room + size(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
       associate (table => simulation%decomposition%boundaries(b)%table)
         if (allocated(table%time)) room = room + size(table%time)
@@ -160,6 +162,7 @@ contains
     times(2) = end_time
     n = 2
     if (allocated(simulation%gravity_table%time)) call add(simulation%gravity_table%time)
+    if (allocated(simulation%cell_drive%table%time)) call add(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
       associate (table => simulation%decomposition%boundaries(b)%table)
         if (allocated(table%time)) call add(table%time)
@@ -190,6 +193,7 @@ contains
     type(boundary_t) :: boundaries(size(simulation%decomposition%boundaries))
     type(physics_t) :: physics
     type(imposed_motion_t) :: motion
+    type(cell_drive_t) :: cell_drive
     real(dp) :: area(size(simulation%decomposition%boundaries)), acceleration(3), pressure, speed
     !> velocity that the largest load of a boundary gives it in a step [m/s]
     real(dp) :: gain(size(simulation%decomposition%boundaries))
@@ -198,6 +202,7 @@ contains
     nd = simulation%decomposition%nd
     boundaries(:) = simulation%decomposition%boundaries
     physics = simulation%physics
+    cell_drive = simulation%cell_drive
     gain(:) = 0.0_dp
     call find_load_areas(simulation%decomposition, area)
     do k = 1, size(times)
@@ -206,6 +211,8 @@ contains
           if (simulation%gravity_table%has(d)) physics%gravity(d) = simulation%gravity_table%at(d, times(k))
         end do
       end if
+      if (allocated(cell_drive%table%has)) call cell_drive%begin_step(simulation%decomposition%period, nd, simulation%mass, &
+        & physics%h, times(k), physics%cell)
       acceleration(:) = physics%gravity + physics%body_force/self%density
       acceleration(nd + 1:) = 0.0_dp
       if (norm2(acceleration) > norm2(self%acceleration)) self%acceleration(:) = acceleration

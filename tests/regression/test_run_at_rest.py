@@ -54,13 +54,16 @@ class AtRest(RunTestCase):
         self.assertRegex(self.straight.stdout.rstrip().splitlines()[-1], f"^finished    all {count} steps reached the accuracy")
 
     def test_what_is_to_come(self):
-        """Grains that rest do not end a run before a gate opens, gravity turns or a belt starts, nor in the ten steps behind that."""
-        files = {"gravity.csv": "time,gx,gy\n0,0,-9.81\n0.1,0,-9.81\n0.2,5,-9.81\n", "belt.csv": "time,vx\n0,0\n0.1,0\n0.2,0.5\n"}
+        """Grains that rest do not end a run before a gate opens, gravity turns, or a belt or a cell starts, nor in the ten steps behind that."""
+        files = {"gravity.csv": "time,gx,gy\n0,0,-9.81\n0.1,0,-9.81\n0.2,5,-9.81\n", "belt.csv": "time,vx\n0,0\n0.1,0\n0.2,0.5\n",
+                 "cell.csv": "time,strain_rate_x\n0,0\n0.1,0\n0.2,-0.2\n"}
         floor = {"shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]}
         ground = {"shape": "plane", "point": [0.0, -0.2], "normal": [0.0, 1.0]}
         for name, boundaries, scene, moved in (("gate", [{**floor, "remove_at": 0.1}, ground], {}, lambda place: place[1] < -0.15),
                                                ("gravity", [floor], {"gravity_table": "gravity.csv"}, lambda place: place[0] > 0.01),
                                                ("belt", [{**floor, "table": "belt.csv"}], {}, lambda place: place[0] > 0.01),
+                                               ("cell", [], {"period": [1.0, 1.0], "cell_table": "cell.csv", "gravity": [0.0, 0.0]},
+                                                lambda place: place[0] > 0.01),
                                                ("nothing", [floor], {}, lambda place: abs(place[0]) < 1e-6)):
             with self.subTest(name):
                 place = self.here(name)

@@ -612,6 +612,7 @@ class BadInput(RunTestCase):
         self.refuse_all([(f"{key} {name}", name, groups, (f"{key} = 'out/{name}'", f"its own {name}", "expected a copy in another place"))
                          for key, name, groups in (
             ("&scene bodies_file", "final_bodies.h5", {"scene": {**file, "bodies_file": "out/final_bodies.h5"}, "output": {"final_bodies": True}}),
+            ("&scene cell_table", "trace.csv", {"scene": {"cell_table": "out/trace.csv"}, "output": {"trace": True}}),
             ("&scene gravity_table", "history.csv", {"scene": {"gravity_table": "out/history.csv"}}),
             ("&scene shapes", "run.log", {"scene": {**file, "bodies_file": "b.csv", "shapes": "out/run.log"}}),
             ("&boundary 'floor' table", "trace.csv", {"boundary": {**PLANE, "name": "floor", "table": "out/trace.csv"}, "output": {"trace": True}}),

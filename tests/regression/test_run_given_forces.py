@@ -353,17 +353,6 @@ class GivenForces(RunTestCase):
         self.assertNotIn(left, results["/steps/20/contacts/antagonist"])
         self.assertIn(floor, results["/steps/20/contacts/antagonist"])
 
-    def test_no_state_of_a_cell_that_moves(self):
-        """The periods of a bodies file are those of its case: a sheared cell has no such file."""
-        case = {"scene": {"bodies": "lattice", "lattice_count": [4, 4], "radius_min": 0.008, "radius_max": 0.008, "period": [0.08, 0.08],
-                          "cell_shear_rate": 1.0, "gravity": [0.0, 0.0]},
-                "time": {"step": STEP, "steps": 2}, "output": {"directory": "results", "every": 2}}
-        run = run_case(case, 1, self.here("sheared"))
-        self.assert_status(run, 0)
-        with self.assertRaisesRegex(package.ResultsError, "a periodic cell that moves: expected a run whose periods stay"):
-            package.write_bodies(package.Run(run.path("results")), self.here("sheared.h5"))
-        self.assertFalse(os.path.exists(self.here("sheared.h5")))
-
     def test_shapes(self):
         """Places tell the points of a pair from each other: two blocks on a table of which one stands on one edge more than on the other."""
         write(self.here("blocks.shapes"), "shape block\nrounding 0.001\npolygon -0.1 -0.05 0.1 -0.05 0.1 0.05 -0.1 0.05\n")

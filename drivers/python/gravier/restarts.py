@@ -32,8 +32,8 @@ def given_contacts(run, step=None):
 
 def write_bodies(run, path, step=None):
     """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
-    and periods are those of its input; walls and periods of a bodies file are in this one. A cell that moves has no such file. A file that is there is
-    replaced where this function has made it."""
+    and periods are those of its input; walls and periods of a bodies file are in this one, and the edges of a cell that moves with their
+    velocities. A file that is there is replaced where this function has made it."""
     try:
         check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [run.path])
     except Misplaced as refused:
@@ -41,9 +41,7 @@ def write_bodies(run, path, step=None):
     if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
         raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
                            "&output writes such a file of the last state")
-    if run.cell(step) is not None:
-        raise ResultsError(f"{run.path}: a periodic cell that moves: expected a run whose periods stay; a checkpoint holds such a cell")
-    bodies, boundaries = run.bodies(step), run.boundaries(step)
+    bodies, boundaries, cell = run.bodies(step), run.boundaries(step), run.cell(step)
     contacts, names = given_contacts(run, step)
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)
@@ -59,7 +57,10 @@ def write_bodies(run, path, step=None):
         walls = [k for k, name in enumerate(boundaries.name) if name == f"wall {boundaries.id[k]}"]
         if walls:
             file["walls/id"], file["walls/point"], file["walls/normal"] = (boundaries[key][walls] for key in ("id", "position", "normal"))
-        if np.any(run.period > 0.0) and "period" not in run.case.get("scene", [{}])[0]:
+        if cell is not None:
+            file["box/origin"], file["box/period"] = cell.origin[:, 0], np.diag(cell.edge)
+            file["box/edge"], file["box/velocity"] = cell.edge, cell.velocity
+        elif np.any(run.period > 0.0) and "period" not in run.case.get("scene", [{}])[0]:
             file["box/origin"], file["box/period"] = run.origin, run.period
         if len(contacts["candidate"]):
             for name, values in contacts.items():

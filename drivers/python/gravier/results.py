@@ -396,8 +396,14 @@ class BodiesFile(Run):
                      position=rows.point, normal=rows.normal)
 
     def cell(self, step=None):
-        """None: the periods of a bodies file do not move."""
+        """As that of a run: axis, edge, velocity, origin of a cell that may be sheared; None where the file has no edges."""
         self.find_step(step)
+        with self._open() as file:
+            if "box/edge" not in file:
+                return None
+            edge = self._values(file["box/edge"])
+            velocity = self._values(file["box/velocity"]) if "box/velocity" in file else np.zeros_like(edge)
+        return Table(axis=np.arange(1, self.dimension + 1), edge=edge, velocity=velocity, origin=self.origin[:, None])
 
     def facets(self, step=None):
         """None: a bodies file has no mesh walls."""

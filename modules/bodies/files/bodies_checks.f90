@@ -146,6 +146,12 @@ contains
     else if (.not. all(is_bounded(bodies%period))) then
       call raise(error, status_input, path//": /box/period: "//to_text(maxval(bodies%period))//", but "//bounded_text// &
         & " was expected")
+    else if (.not. (all(is_finite(bodies%tilt)) .and. all(is_bounded(bodies%tilt)))) then
+      call raise(error, status_input, path//": /box/edge: a number in it is none or too large, but "//bounded_text//" was expected")
+    else if (.not. (all(is_finite(bodies%length_rate)) .and. all(is_bounded(bodies%length_rate)) .and. &
+      & all(is_finite(bodies%tilt_rate)) .and. all(is_bounded(bodies%tilt_rate)))) then
+      call raise(error, status_input, path//": /box/velocity: a number in it is none or too large, but "//bounded_text// &
+        & " was expected")
     end if
   end subroutine check_box
 

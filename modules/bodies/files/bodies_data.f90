@@ -51,6 +51,10 @@ module gravier_bodies_data
     !> whether the file has a periodic box, its lower corner and its lengths; an axis of length 0 is not periodic
     logical :: has_box = .false.
     real(dp) :: origin(3) = 0, period(3) = 0
+    !> whether it is a cell that may be sheared and may move: tilts of its edges [m], rates of its lengths and tilts [m/s], as those
+    !> of period_t
+    logical :: has_edges = .false.
+    real(dp) :: tilt(3) = 0, length_rate(3) = 0, tilt_rate(3) = 0
     !> from which the first solve starts; none where the file has none
     type(given_contacts_t) :: contacts
   end type bodies_data_t

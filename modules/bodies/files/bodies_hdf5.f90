@@ -1,5 +1,5 @@
 !> Bodies and walls from and to HDF5: /bodies/{id, position, velocity, radius, mass, group, material, shape, scale, orientation},
-!> /walls/{id, point, normal}, /box/{origin, period} and /contacts (gravier_bodies_contacts).
+!> /walls/{id, point, normal}, /box/{origin, period, edge, velocity} and /contacts (gravier_bodies_contacts).
 module gravier_bodies_hdf5
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow, take_count
@@ -24,7 +24,9 @@ module gravier_bodies_hdf5
   !> those of scenes that have shapes
   character(len=*), parameter :: shaped_sets(10) = [character(len=11) :: body_sets, "shape", "scale", "orientation"]
   character(len=*), parameter :: wall_sets(3) = [character(len=8) :: "id", "point", "normal"]
-  character(len=*), parameter :: box_sets(2) = [character(len=8) :: "origin", "period"]
+  character(len=*), parameter :: box_sets(4) = [character(len=8) :: "origin", "period", "edge", "velocity"]
+  character(len=*), parameter :: form_of_edges = "rows with parts along their own axis and the axes before it alone, as far as "// &
+    & "these are periodic"
   !> room for the headers of the file
   integer(i8), parameter :: bytes_of_headers = 65536
   integer, parameter :: bytes_of_word = 8
@@ -171,11 +173,14 @@ contains
     type(bodies_data_t), intent(inout) :: bodies
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: n
+    logical :: required(size(box_sets))
 
     if (allocated(error)) return
     bodies%has_box = file%exists("/box")
     if (.not. bodies%has_box) return
-    call check_lengths(file, path, "/box", box_sets, [.true., .true.], n, error)
+    required(:) = [.true., .true., .false., .false.]
+    required(3) = file%exists("/box/velocity")
+    call check_lengths(file, path, "/box", box_sets, required, n, error)
     if (allocated(error)) return
     if (n /= dimension) then
       call raise(error, status_input, path//": /box/origin: "//to_text(n)//" numbers, but "//to_text(dimension)// &
@@ -184,8 +189,75 @@ contains
     end if
     call file%read_rows("/box/origin", 0_i8, bodies%origin(1:dimension), error)
     call file%read_rows("/box/period", 0_i8, bodies%period(1:dimension), error)
+    bodies%has_edges = file%exists("/box/edge")
+    if (bodies%has_edges) call read_edges(file, path, dimension, bodies, error)
     call check_box(path, bodies, error)
   end subroutine read_box
+
+  !> Read the edges of a cell, a row each, and their velocities, 0 where the file has none.
+  subroutine read_edges(file, path, dimension, bodies, error)
+    type(h5_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: dimension
+    type(bodies_data_t), intent(inout) :: bodies
+    type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: edge(dimension, dimension), velocity(dimension, dimension), length(3)
+
+    velocity(:, :) = 0.0_dp
+    call file%read_rows("/box/edge", 0_i8, edge, error)
+    if (file%exists("/box/velocity")) call file%read_rows("/box/velocity", 0_i8, velocity, error)
+    if (allocated(error)) return
+    call split_edges(edge, length, bodies%tilt)
+    if (any(abs(length - bodies%period) > 0.0_dp)) call raise(error, status_input, path//": /box/edge: lengths along the axes "// &
+      & "that are not those of /box/period")
+    call split_edges(velocity, bodies%length_rate, bodies%tilt_rate)
+    if (has_other_parts(edge, bodies%period)) call raise(error, status_input, path//": /box/edge: expected "//form_of_edges)
+    if (has_other_parts(velocity, bodies%period)) call raise(error, status_input, path//": /box/velocity: expected "//form_of_edges)
+  end subroutine read_edges
+
+  !> What edges, in columns, have along their own axes, and along the axes before: b along x, c along x, c along y.
+  pure subroutine split_edges(edge, length, tilt)
+    real(dp), intent(in) :: edge(:, :)
+    real(dp), intent(out) :: length(3), tilt(3)
+    integer :: d
+
+    length(:) = 0.0_dp
+    tilt(:) = 0.0_dp
+    do d = 1, size(edge, 1)
+      length(d) = edge(d, d)
+    end do
+    tilt(1) = edge(1, 2)
+    if (size(edge, 1) == 3) tilt(2:3) = edge(1:2, 3)
+  end subroutine split_edges
+
+  !> The edges of split_edges.
+  pure subroutine join_edges(length, tilt, edge)
+    real(dp), intent(in) :: length(3), tilt(3)
+    real(dp), intent(out) :: edge(:, :)
+    integer :: d
+
+    edge(:, :) = 0.0_dp
+    do d = 1, size(edge, 1)
+      edge(d, d) = length(d)
+    end do
+    edge(1, 2) = tilt(1)
+    if (size(edge, 1) == 3) edge(1:2, 3) = tilt(2:3)
+  end subroutine join_edges
+
+  !> Whether edges, or their velocities, have parts along axes after their own, or where an axis is not periodic. A number that is
+  !> none is no such part.
+  pure logical function has_other_parts(edge, period)
+    real(dp), intent(in) :: edge(:, :), period(3)
+    integer :: a, b
+
+    has_other_parts = .false.
+    do b = 1, size(edge, 1)
+      do a = 1, size(edge, 1)
+        if (a <= b .and. period(a) > 0.0_dp .and. period(b) > 0.0_dp) cycle
+        has_other_parts = has_other_parts .or. abs(edge(a, b)) > 0.0_dp
+      end do
+    end do
+  end function has_other_parts
 
   !> Every rank reads all walls.
   subroutine read_walls(file, path, dimension, bodies, error)
@@ -347,6 +419,7 @@ contains
     type(h5_file_t), intent(inout) :: file
     type(bodies_data_t), intent(in) :: bodies
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: edge(bodies%dimension, bodies%dimension)
     integer :: n
 
     n = merge(bodies%dimension, 0, comm%rank == 0)
@@ -355,6 +428,13 @@ contains
     call file%write_attribute("/box/origin", "unit", "m", error)
     call file%write_rows("/box/period", bodies%period(1:n), error)
     call file%write_attribute("/box/period", "unit", "m", error)
+    if (.not. bodies%has_edges) return
+    call join_edges(bodies%period, bodies%tilt, edge)
+    call file%write_rows("/box/edge", edge(:, 1:n), error)
+    call file%write_attribute("/box/edge", "unit", "m", error)
+    call join_edges(bodies%length_rate, bodies%tilt_rate, edge)
+    call file%write_rows("/box/velocity", edge(:, 1:n), error)
+    call file%write_attribute("/box/velocity", "unit", "m/s", error)
   end subroutine write_box
 
   !> The bodies of all ranks in the order of the ids, cut into equal blocks.
@@ -408,6 +488,10 @@ contains
     sorted%has_box = bodies%has_box
     sorted%origin = bodies%origin
     sorted%period = bodies%period
+    sorted%has_edges = bodies%has_edges
+    sorted%tilt = bodies%tilt
+    sorted%length_rate = bodies%length_rate
+    sorted%tilt_rate = bodies%tilt_rate
   end subroutine sort_by_id
 
 end module gravier_bodies_hdf5

@@ -1,16 +1,22 @@
-!> What moves a periodic cell: rates of strain, or stresses that are held (gravier_moving_cell).
+!> What moves a periodic cell: rates of strain, or stresses that are held (gravier_moving_cell), constant or against time.
 module gravier_cell_drive
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
   use gravier_periodic, only: period_t, gradient_times
   use gravier_moving_cell, only: cell_motion_t
+  use gravier_time_table, only: time_table_t
+  use gravier_body_store, only: body_set_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_cell_response, only: respond, carry_along
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: cell_drive_t, carry_grains, take_cell, check_cell_size
+  public :: cell_drive_t, cell_components, cell_component, component_row, component_column, carry_grains, carry_bodies, &
+    & take_cell, check_cell_size
+
+  !> Components of the velocity gradient of a cell: three strains and the shears xy, xz and yz, by row and column.
+  integer, parameter :: component_row(6) = [1, 2, 3, 1, 1, 2], component_column(6) = [1, 2, 3, 2, 3, 3]
 
   !> Matrices are 0 below the diagonal.
   type :: cell_drive_t
@@ -21,25 +27,78 @@ module gravier_cell_drive
     logical :: driven(3, 3) = .false.
     !> inertia of the cell over that of its grains, M L^2 with the mass of the grains M and the length L along the axis
     real(dp) :: inertia = 1.0_dp
+    !> rates and then stresses of the components that a cell has (cell_components), of which those that it has replace the others;
+    !> without `has` where there is no table
+    type(time_table_t) :: table
   contains
+    procedure :: set_time => cell_drive_set_time
+    procedure :: moved => cell_drive_moved
     procedure :: begin_step => cell_drive_begin_step
   end type cell_drive_t
 
 contains
 
-  !> The motion of a step without contacts: of the cell at q_m, which has the rates of the start of the step.
-  pure subroutine cell_drive_begin_step(self, period, nd, mass, h, motion)
+  !> How many components a cell of `nd` dimensions has.
+  pure integer function cell_components(nd) result(n)
+    integer, intent(in) :: nd
+    n = 3*(nd - 1)
+  end function cell_components
+
+  !> The k-th of them, by its place in component_row and component_column.
+  pure integer function cell_component(k, nd) result(component)
+    integer, intent(in) :: k, nd
+    component = merge(4, k, nd == 2 .and. k == 3)
+  end function cell_component
+
+  !> Take the rates and stresses of a time from the table, where there is one. A shear stress drives the cell along itself: it is
+  !> held where the contacts resist with a negative component of the mean stress, in which compression is positive.
+  pure subroutine cell_drive_set_time(self, nd, time)
+    class(cell_drive_t), intent(inout) :: self
+    integer, intent(in) :: nd
+    !> [s]
+    real(dp), intent(in) :: time
+    integer :: k, n
+
+    if (.not. allocated(self%table%has)) return
+    n = cell_components(nd)
+    do k = 1, n
+      associate (a => component_row(cell_component(k, nd)), b => component_column(cell_component(k, nd)))
+        if (self%table%has(k)) self%rate(a, b) = self%table%at(k, time)
+        if (self%table%has(n + k)) self%stress(a, b) = merge(1.0_dp, -1.0_dp, a == b)*self%table%at(n + k, time)
+      end associate
+    end do
+  end subroutine cell_drive_set_time
+
+  !> The components that move at some time, by a rate or by a stress.
+  pure function cell_drive_moved(self, nd) result(moved)
     class(cell_drive_t), intent(in) :: self
+    integer, intent(in) :: nd
+    logical :: moved(3, 3)
+    integer :: k
+
+    moved(:, :) = abs(self%rate) > 0.0_dp .or. self%driven
+    if (.not. allocated(self%table%has)) return
+    do k = 1, cell_components(nd)
+      if (self%table%has(k)) moved(component_row(cell_component(k, nd)), component_column(cell_component(k, nd))) = .true.
+    end do
+  end function cell_drive_moved
+
+  !> The motion of a step without contacts: of the cell at q_m, which has the rates of the start of the step.
+  pure subroutine cell_drive_begin_step(self, period, nd, mass, h, time, motion)
+    class(cell_drive_t), intent(inout) :: self
     type(period_t), intent(in) :: period
     integer, intent(in) :: nd
     !> of the grains [kg]; step [s]
     real(dp), intent(in) :: mass, h
+    !> at the end of the step, whose rates and stresses count [s]
+    real(dp), intent(in) :: time
     type(cell_motion_t), intent(out) :: motion
     real(dp) :: volume, gradient(3, 3)
     integer :: b
 
     motion%moves = period%moves
     if (.not. motion%moves) return
+    call self%set_time(nd, time)
     motion%driven(:, :) = self%driven
     motion%is_driven = any(self%driven)
     gradient(:, :) = period%gradient()
@@ -86,21 +145,30 @@ contains
   pure subroutine carry_grains(decomposition, motion)
     type(decomposition_t), intent(inout) :: decomposition
     type(cell_motion_t), intent(in) :: motion
-    real(dp) :: centre(3), change(3, 3), place(decomposition%nd), carried(decomposition%nd)
-    integer :: s, k, nd
+    real(dp) :: centre(3), change(3, 3)
+    integer :: s
 
-    nd = decomposition%nd
     centre(:) = decomposition%period%centre()
     change(:, :) = motion%now - motion%before
     do s = 1, size(decomposition%owned)
-      associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          place(:) = owned%position(:, k) - centre(1:nd)
-          carried(:) = gradient_times(change, place)
-          owned%velocity(1:nd, k) = owned%velocity(1:nd, k) + carried
-        end do
-      end associate
+      call carry_bodies(centre, change, decomposition%owned(s))
     end do
   end subroutine carry_grains
+
+  !> Carry bodies along with a change of the velocity gradient of a cell.
+  pure subroutine carry_bodies(centre, change, bodies)
+    !> the middle of the cell [m], [1/s]
+    real(dp), intent(in) :: centre(3), change(3, 3)
+    type(body_set_t), intent(inout) :: bodies
+    real(dp) :: place(bodies%nd), carried(bodies%nd)
+    integer :: k, nd
+
+    nd = bodies%nd
+    do k = 1, bodies%n
+      place(:) = bodies%position(:, k) - centre(1:nd)
+      carried(:) = gradient_times(change, place)
+      bodies%velocity(1:nd, k) = bodies%velocity(1:nd, k) + carried
+    end do
+  end subroutine carry_bodies
 
 end module gravier_cell_drive

@@ -351,7 +351,7 @@ contains
     call check_write_box([0.0_dp, 0.0_dp], [1.0_dp, -2.0_dp], error)
     call expect(error, status_failure, "/box/period: -2.00000000E+00, but a number >= 0 was expected", "writing a negative period")
     call refuse_layout("+/box/period", "/box/origin: missing")
-    call refuse_layout("+/box/size", "/box/size: unknown; known are origin, period")
+    call refuse_layout("+/box/size", "/box/size: unknown; known are origin, period, edge, velocity")
     call refuse_box(1, 1.0_dp, "/box/origin: 1 numbers, but 2 were expected")
     call refuse_box(2, -1.0_dp, "/box/period: -1.00000000E+00, but a number >= 0 was expected")
     call refuse_box(2, ieee_value(1.0_dp, ieee_quiet_nan), "/box/period: NaN or infinity")

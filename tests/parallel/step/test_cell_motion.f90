@@ -43,7 +43,7 @@ contains
     drive%driven(2, 2) = .true.
     drive%inertia = 0.5_dp
     period%length_rate(2) = -0.3_dp
-    call drive%begin_step(period, 2, 4.0_dp, 0.01_dp, motion)
+    call drive%begin_step(period, 2, 4.0_dp, 0.01_dp, 0.01_dp, motion)
     call check(motion%moves .and. motion%is_driven, "a stress drives it")
     call check_close(motion%before(2, 2), -0.1_dp, 1.0e-15_dp, "gradient at the start")
     call check_close(motion%inertia(2, 2), 0.5_dp*4.0_dp*9.0_dp, 1.0e-14_dp, "inertia")

@@ -149,6 +149,7 @@ contains
     call check_vector(scene%cell_shear_rate, [0.25_dp, 0.0_dp, 0.0_dp], "cell_shear_rate")
     call check_vector(scene%cell_pressure, [0.0_dp, 0.0_dp, 7.0_dp], "cell_pressure")
     call check_vector(scene%cell_shear_stress, [0.0_dp, 0.0_dp, -2.0_dp], "cell_shear_stress")
+    call check_equal(scene%cell_table, "cell.csv", "cell_table")
     call check_close(scene%cell_inertia, 0.5_dp, 0.0_dp, "cell_inertia")
     call check_close(scene%skin, 0.375_dp, 0.0_dp, "skin")
     call check(scene%skin_given, "skin_given")
@@ -185,7 +186,7 @@ contains
       // "  period = 0, 8, 16, period_origin = -1, -2, -3, body_force = 4, 5, 6" // newline &
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
       // "  start_overlap = 0.25, list_steps = 12, cell_strain_rate = 0, 0.5, cell_shear_rate = 0.25" // newline &
-      // "  cell_pressure = 0, 0, 7, cell_shear_stress = 0, 0, -2, cell_inertia = 0.5" // newline &
+      // "  cell_pressure = 0, 0, 7, cell_shear_stress = 0, 0, -2, cell_table = 'cell.csv', cell_inertia = 0.5" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75, rest_energy = 0.001 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
@@ -295,6 +296,7 @@ contains
     call check_vector(scene%cell_shear_rate, spread(0.0_dp, 1, 3), "default cell_shear_rate")
     call check_vector(scene%cell_pressure, spread(0.0_dp, 1, 3), "default cell_pressure")
     call check_vector(scene%cell_shear_stress, spread(0.0_dp, 1, 3), "default cell_shear_stress")
+    call check_equal(scene%cell_table, "", "default cell_table")
     call check_close(scene%cell_inertia, 0.1_dp, 0.0_dp, "default cell_inertia")
     call check(.not. scene%skin_given, "default skin_given")
     call check(.not. scene%overlap_allowed_given, "default overlap_allowed_given")
@@ -801,6 +803,7 @@ contains
     call check_vector(config%time%stop_cell_strain, [0.0_dp, -0.5_dp, 0.0_dp], "stop_cell_strain")
     call check_vector(config%time%stop_cell_shear, [-0.25_dp, 0.0_dp, 0.0_dp], "stop_cell_shear")
     call accept("&scene bodies = 'column' cell_pressure = 4" // steps // "stop_cell_strain = 0.5 /", "of a pressure", config)
+    call accept("&scene bodies = 'column' cell_table = 'c.csv'" // steps // "stop_cell_strain = 0.5 /", "of a table", config)
     call refuse("&scene bodies = 'column'" // steps // "stop_cell_strain = 0, 0.5 /", "&time stop_cell_strain = 0, 0.5: expected " &
       // "0 for components of the cell that neither cell_strain_rate nor cell_pressure moves")
     call refuse("&scene bodies = 'column' cell_strain_rate = 1, 1" // steps // "stop_cell_shear = 1 /", &
@@ -1556,6 +1559,7 @@ contains
     call check_round_trip(column, "a column")
     call check_round_trip(whole_file(), "a whole file")
     call check_round_trip(scene("bodies = 'column' gravity_table = 'g.csv'"), "a table of gravity")
+    call check_round_trip(scene("bodies = 'column' cell_table = 'c.csv'"), "a table of the cell")
     call check_round_trip(column // "&solver method = 'schwarz' relaxation = 0.5 /", "a given relaxation")
     call check_round_trip(scene("bodies = 'lattice' alert_distance = 1e-300 density = 1234567.125" // lattice_keys), &
       "a lattice")
