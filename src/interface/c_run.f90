@@ -207,6 +207,7 @@ contains
     character(len=*), intent(in) :: name
     real(dp), intent(inout) :: value
     type(error_t), allocatable, intent(inout) :: error
+    integer :: k
 
     associate (simulation => loop%run%simulation, figures => loop%run%figures)
       select case (name)
@@ -233,7 +234,12 @@ contains
       case ("velocity_error")
         value = relative_error(figures%solve)
       case default
-        call raise(error, status_input, "real number '"//name//"': unknown; gravier.h has the names")
+        do k = simulation%diagnostics%n_columns, 1, -1
+          if (simulation%diagnostics%name(k) == name) exit
+        end do
+        if (k == 0) call raise(error, status_input, "real number '"//name//"': unknown; gravier.h has the names, and "// &
+          & "options of &output add those of their columns in history.csv")
+        if (k > 0) value = simulation%diagnostics%value(k)
       end select
     end associate
   end subroutine find_real

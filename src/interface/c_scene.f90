@@ -1,4 +1,4 @@
-!> The C interface of the scene of a run (gravier_c_run), between two steps: bodies, boundaries, loads and coefficients.
+!> The C interface of the scene of a run (gravier_c_run), between two steps: bodies, boundaries, the cell, loads and coefficients.
 module gravier_c_scene
   use, intrinsic :: iso_c_binding, only: c_char, c_double, c_int, c_int64_t, c_loc, c_null_ptr, c_ptr
   use gravier_kinds, only: dp
@@ -8,12 +8,14 @@ module gravier_c_scene
   use gravier_user_loop, only: user_loop_t
   use gravier_user_bodies, only: newcomers_t, add_bodies, remove_bodies
   use gravier_user_boundaries, only: get_boundary, set_boundary
+  use gravier_user_cell, only: get_cell, set_cell
   use gravier_c_handle, only: find_loop
   use gravier_c_text, only: told, text_of, put_text
   implicit none
   private
   public :: gravier_array, gravier_check_array, gravier_set_array, gravier_set_gravity, gravier_set_friction
   public :: gravier_boundary, gravier_boundary_name, gravier_get_boundary, gravier_set_boundary
+  public :: gravier_get_cell, gravier_set_cell
   public :: gravier_add_bodies, gravier_remove_bodies
 
   !> kinds of the numbers of an array
@@ -132,6 +134,35 @@ contains
     if (.not. allocated(error)) call loop%set_friction(0, value, error)
     status = told(error)
   end function gravier_set_friction
+
+  !> A quantity of the periodic cell by its name.
+  integer(c_int) function gravier_get_cell(handle, name, value) result(status) bind(C, name="gravier_get_cell")
+    type(c_ptr), value :: handle
+    !> text of C
+    type(c_ptr), value :: name
+    real(c_double), intent(out) :: value
+    type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
+
+    value = 0.0_dp
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call get_cell(loop, text_of(name), value, error)
+    status = told(error)
+  end function gravier_get_cell
+
+  !> Set a rate or a stress of the periodic cell. The same on all ranks.
+  integer(c_int) function gravier_set_cell(handle, name, value) result(status) bind(C, name="gravier_set_cell")
+    type(c_ptr), value :: handle
+    !> text of C
+    type(c_ptr), value :: name
+    real(c_double), value :: value
+    type(user_loop_t), pointer :: loop
+    type(error_t), allocatable :: error
+
+    call find_loop(handle, loop, error)
+    if (.not. allocated(error)) call set_cell(loop, text_of(name), value, error)
+    status = told(error)
+  end function gravier_set_cell
 
   !> Number of a boundary, from 0, by its name.
   integer(c_int) function gravier_boundary(handle, name, number) result(status) bind(C, name="gravier_boundary")

@@ -44,7 +44,7 @@ const char *gravier_error(void);
 /* Numbers by name. Whole: goes_on, step, steps, dimension, velocity_entries, subdomains (of this rank), boundaries, rank, ranks, restarted,
  * bodies; of the last step contacts, iterations, converged, left, entered.
  * Real: time, time_step, theta, gravity_x, gravity_y, gravity_z, friction; of the last step kinetic_energy, max_overlap, residual,
- * velocity_error. */
+ * velocity_error, and what options of &output add to history.csv, such as stress_xx. */
 int gravier_whole(gravier_simulation *simulation, const char *name, int64_t *value);
 int gravier_real(gravier_simulation *simulation, const char *name, double *value);
 
@@ -64,6 +64,11 @@ int gravier_set_array(gravier_simulation *simulation, const char *name, int subd
 /* What follows is set with the same values on all ranks, holds from the next step on, and is not in checkpoints. */
 int gravier_set_gravity(gravier_simulation *simulation, const double *values, int n);
 int gravier_set_friction(gravier_simulation *simulation, double value);
+
+/* The periodic cell, where it moves or is sheared. To read: length_x, tilt_xy, strain_rate_x, shear_rate_xy, pressure_x, shear_stress_xy and
+ * the like; what is held is 0 where a rate moves a component. To set: rates, and stresses of components that stresses drive in the case. */
+int gravier_get_cell(gravier_simulation *simulation, const char *name, double *value);
+int gravier_set_cell(gravier_simulation *simulation, const char *name, double value);
 
 /* Boundaries, from 0; NULL for a name is an error. To read: position, normal, velocity (of its pivot, else of its position), spin, force (of
  * the grains on it, in the last step), applied_force, pressure, friction. To set: velocity, spin, applied_force, pressure, friction. */

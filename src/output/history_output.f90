@@ -12,6 +12,10 @@ module gravier_history_output
   private
   public :: history_output_t, open_table
 
+  !> columns of a cell that moves, as far as a scene has them: its strains and its shears
+  character(len=*), parameter :: strains(3) = [character(len=13) :: "cell_strain_x", "cell_strain_y", "cell_strain_z"], &
+    & shears(3) = [character(len=13) :: "cell_shear_xy", "cell_shear_xz", "cell_shear_yz"]
+
   type, extends(output_t) :: history_output_t
     private
     type(csv_writer_t) :: table
@@ -86,6 +90,14 @@ contains
       & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
       & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds,sleeping,woken"
     if (simulation%inflow%exists()) header = header//",entered,entered_mass"
+    if (simulation%decomposition%period%moves) then
+      do k = 1, simulation%decomposition%nd
+        header = header//","//strains(k)
+      end do
+      do k = 1, merge(1, 3, simulation%decomposition%nd == 2)
+        header = header//","//shears(k)
+      end do
+    end if
     do k = 1, simulation%diagnostics%n_columns
       if (simulation%diagnostics%in_history(k)) header = header//","//trim(simulation%diagnostics%name(k))
     end do
@@ -98,6 +110,7 @@ contains
     type(step_figures_t), intent(in) :: figures
     real(dp), intent(in) :: seconds
     type(error_t), allocatable, intent(inout) :: error
+    real(dp) :: strain(3)
     integer :: k
 
     if (simulation%comm%rank /= 0) return
@@ -133,6 +146,15 @@ contains
       if (simulation%inflow%exists()) then
         call table%add(figures%entered)
         call table%add(figures%entered_mass)
+      end if
+      if (simulation%decomposition%period%moves) then
+        strain(:) = simulation%cell_strain()
+        do k = 1, simulation%decomposition%nd
+          call table%add(strain(k))
+        end do
+        do k = 1, merge(1, 3, simulation%decomposition%nd == 2)
+          call table%add(simulation%decomposition%period%shear(k))
+        end do
       end if
       do k = 1, simulation%diagnostics%n_columns
         if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))

@@ -83,8 +83,7 @@ contains
 
     why = ""
     associate (period => simulation%decomposition%period, time => simulation%config%time)
-      strain(:) = 0.0_dp
-      where (period%length > 0.0_dp) strain = log(period%length/simulation%first_length)
+      strain(:) = simulation%cell_strain()
       call look(strained, strain, "stop_cell_strain", time%stop_cell_strain)
       call look(sheared, period%shear, "stop_cell_shear", time%stop_cell_shear)
     end associate

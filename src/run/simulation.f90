@@ -69,6 +69,7 @@ module gravier_simulation
     procedure :: start_diagnostics => simulation_start_diagnostics
     procedure :: note_files => simulation_note_files
     procedure :: goes_on_with => simulation_goes_on_with
+    procedure :: cell_strain => simulation_cell_strain
     procedure :: free => simulation_free
   end type simulation_t
 
@@ -142,6 +143,18 @@ contains
     allocate (self%boundary_impulses(scene%grains%nd, size(scene%boundaries)), source=0.0_dp)
     grains = scene%grains
   end subroutine simulation_make
+
+  !> Strains of the periodic cell along its axes since the start of the scene, logarithms of the lengths over those of then,
+  !> extension positive; 0 along axes that are not periodic.
+  pure function simulation_cell_strain(self) result(strain)
+    class(simulation_t), intent(in) :: self
+    real(dp) :: strain(3)
+
+    strain(:) = 0.0_dp
+    associate (length => self%decomposition%period%length)
+      where (length > 0.0_dp) strain = log(length/self%first_length)
+    end associate
+  end function simulation_cell_strain
 
   !> Share the grains of a new scene out. Errors are the same on all ranks. Collective.
   subroutine simulation_start(self, grains, error)

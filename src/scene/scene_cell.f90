@@ -10,7 +10,7 @@ module gravier_scene_cell
   use gravier_config_types, only: config_t, scene_config_t
   implicit none
   private
-  public :: make_cell_drive, set_period, stop_cell, check_cell
+  public :: make_cell_drive, set_period, stop_cell, check_cell, rate_columns, stress_columns
 
   character(len=1), parameter :: axes(3) = ["x", "y", "z"]
   !> columns of a table: the rate of a component, and the stress in its place

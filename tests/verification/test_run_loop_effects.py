@@ -242,6 +242,32 @@ with gravier.Simulation(case, quiet=True, forces=True) as s:
             self.assertGreater(asleep[1199], 20)
             self.assertEqual(asleep[1200], 0)
 
+    def test_cell(self):
+        """What a loop sets of a cell acts as in the case; it reads edges, rates, stresses that are held, and columns of history.csv."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.4, "radius_max": 0.6, "friction": 0.3, "density": 1.0,
+                          "gravity": [0.0, 0.0], "period": [7.6, 7.6], "cell_shear_stress": [0.05], "cell_strain_rate": [0.1, 0.0],
+                          "cell_pressure": [0.0, 1.0]},
+                "time": {"step": 0.05, "steps": 100}, "output": {"directory": "results", "every": 100, "stress": True}}
+        script = """
+with gravier.Simulation(case, quiet=True) as s:
+    s.cell.pressure_y, s.cell.shear_stress_xy, s.cell.strain_rate_x = 2.0, -0.2, -0.05
+    while s.goes_on:
+        s.step()
+    assert (s.cell.pressure_y, s.cell.shear_stress_xy, s.cell.pressure_x) == (2.0, -0.2, 0.0)
+    print(s.cell.strain_rate_x, s.cell.length_x, s.cell.length_y, s.cell.tilt_xy, s.cell.shear_rate_xy, s.real("stress_yy"))
+"""
+        wanted = merged(case, {"scene": {"cell_pressure": [0.0, 2.0], "cell_shear_stress": [-0.2], "cell_strain_rate": [-0.05, 0.0]}})
+        loop, program = self.play("cell", case, script), run_case(wanted, directory=self.here("cell as in the case"))
+        state, history = program.results(), program.history()
+        for name in ("bodies/position", "bodies/velocity", "cell/edge", "cell/velocity", "contacts/impulse"):
+            np.testing.assert_array_equal(loop.results()["/steps/100/" + name], state["/steps/100/" + name], name)
+        strain_rate, length_x, length_y, tilt, rate, stress = map(float, loop.stdout.split()[-6:])
+        edge, velocity = (state[f"/steps/100/cell/{name}"] for name in ("edge", "velocity"))
+        self.assertEqual([length_x, length_y, tilt], [edge[0, 0], edge[1, 1], edge[1, 0]])
+        gradient = np.linalg.solve(edge, velocity).T
+        np.testing.assert_allclose([strain_rate, rate], gradient[0], rtol=0, atol=1e-14)
+        self.assertEqual(stress, history["stress_yy"][-1])
+
     def test_bodies_of_a_cell_that_moves(self):
         """What is taken out of a cell, and velocities that are set, are counted once; the last body of a cell that stresses drive stays."""
         case = {"scene": {"bodies": "file", "bodies_file": "../cell.csv", "period": [1.0, 1.0], "gravity": [0.0, 0.0], "cell_shear_rate": 0.5},

@@ -245,6 +245,31 @@ with gravier.Simulation(case, quiet=True{options}) as s:
         self.refused("moving", merged(free, {"scene": {"period": [1.0, 1.0], "gravity": [0.0, 0.0], "cell_shear_rate": [0.1]}}),
                      "s.add_bodies([[0.5, 0.9]], 0.01)",
                      "add_bodies: the periodic cell of the scene moves; expected one that stays as it is")
+        cell = {"scene": {"period": [1.0, 1.0], "gravity": [0.0, 0.0], "cell_shear_rate": [0.1], "cell_pressure": [0.0, 5.0],
+                          "cell_table": "../cell.csv"}}
+        with open(self.here("cell.csv"), "w", encoding="ascii") as file:
+            file.write("time,strain_rate_x\n0,0.1\n")
+        names = "strain_rate_x, pressure_x, strain_rate_y, pressure_y, shear_rate_xy, shear_stress_xy"
+        for title, statement, line in (
+                ("of a table", "s.cell.strain_rate_x = 0.2", "cell: strain_rate_x: cell_table moves this component; expected a table without it"),
+                ("driven", "s.cell.strain_rate_y = 0.2", "cell: strain_rate_y: a stress drives this component; expected pressure_y"),
+                ("with a rate", "s.cell.shear_stress_xy = 0.2",
+                 "cell: shear_stress_xy: no stress drives this component in the case; expected shear_rate_xy"),
+                ("pulled", "s.cell.pressure_y = -1.0", "cell: pressure_y: expected a pressure >= 0"),
+                ("far", "s.cell.pressure_y = 1e31", "cell: pressure_y is not a number to reckon with; expected a number of at most 1e30 in size"),
+                ("no number", "s.cell.pressure_y = 'much'", "cell: pressure_y: expected numbers"),
+                ("edge", "s.cell.length_x = 1.0", f"cell: length_x cannot be set; expected one of {names}"),
+                ("unknown", "s.cell.pressure_z", f"cell: pressure_z: unknown; expected one of {names}, length_x, length_y, tilt_xy"),
+                ("column", "s.real('stress_xx')", "real number 'stress_xx': unknown; gravier.h has the names, and options of &output add those of "
+                                                  "their columns in history.csv")):
+            self.refused("cell " + title, merged(free, cell), statement, line)
+        with open(self.here("grain.csv"), "w", encoding="ascii") as file:
+            file.write("id,x,y,radius\n1,0.5,0.5,0.1\n")
+        grain = {"bodies": "file", "bodies_file": "../grain.csv", "period": [1.0, 0.0], "gravity": [0.0, 0.0], "cell_strain_rate": [0.1, 0.0]}
+        self.refused("no period", {"scene": grain, "time": {"step": 1e-3, "steps": 2}, "output": {"directory": "results"}},
+                     "s.cell.shear_rate_xy = 1.0", "cell: shear_rate_xy: expected a component along axes that are periodic")
+        for statement in ("s.cell.shear_rate_xy", "s.cell.shear_rate_xy = 1.0"):
+            self.refused("no cell", HEAP, statement, "cell: that of the scene does not move; expected a periodic cell that moves in the case")
         walls = [{**wall, "friction": 0.2} for wall in HEAP["boundary"]]
         self.refused("bouncing", merged(HEAP, {"scene": {"friction": 0.0, "tangential_restitution": 0.5}, "boundary": [
             {**wall, "tangential_restitution": 0.0} for wall in walls]}), "s.friction = 0.2",

@@ -39,6 +39,7 @@ def find_library():
 ARGUMENTS = {
     "open": "ssiI*", "step": "h", "stop": "hs", "checkpoint": "h", "close": "h", "finalize": "", "abort": "", "error": "",
     "whole": "hs*", "real": "hs*", "array": "hsi***", "check_array": "hsi**", "set_array": "hsi**", "set_gravity": "h*i", "set_friction": "hd",
+    "get_cell": "hs*", "set_cell": "hsd",
     "boundary": "hs*", "boundary_name": "hi", "get_boundary": "his**", "set_boundary": "his*i",
     "add_bodies": "hi*****", "remove_bodies": "hi*", "sum": "hi*", "highest": "hi*",
 }

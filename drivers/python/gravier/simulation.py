@@ -14,81 +14,12 @@ import traceback
 
 import numpy as np
 
+from .arrays import plain, read_only, reals
 from .library import SimulationError, call, load
+from .scene_parts import Boundaries, Cell
 
 RESTART, QUIET, FORCES = 1, 2, 4
 KINDS = {0: "<f8", 1: "<i8", 2: "<i4"}
-
-
-class StaleArray(Exception):
-    """An array of bodies is used after the step for which it is valid."""
-
-
-#: attributes of an array that say nothing of its values
-WITHOUT_VALUES = frozenset(("_owner", "_mark", "shape", "ndim", "size", "dtype", "itemsize", "nbytes", "flags", "__class__", "__dict__", "__len__"))
-
-
-class View(np.ndarray):
-    """A field of bodies, in memory of its own: to be read, until the next step. numpy asks nobody before numpy.array and numpy.asarray: they
-    give the values of the step that it is of."""
-
-    def __array_finalize__(self, other):
-        self._owner, self._mark = getattr(other, "_owner", None), getattr(other, "_mark", None)
-
-    def __getattribute__(self, name):
-        if name not in WITHOUT_VALUES:
-            _refuse_stale(self)
-        return np.ndarray.__getattribute__(self, name)
-
-    def __getitem__(self, key):
-        _refuse_stale(self)
-        return super().__getitem__(key)
-
-    def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
-        return getattr(ufunc, method)(*(_plain(one) for one in inputs), **{key: _plain(one) for key, one in keywords.items()})
-
-    def __array_function__(self, function, types, arguments, keywords):
-        return function(*_plain(arguments), **_plain(keywords))
-
-    def copy(self, order="C"):
-        return _plain(self).copy(order)
-
-
-def _guarded(name):
-    """A special method, which Python does not look up among the attributes of an array."""
-    return lambda self, *arguments: getattr(_plain(self), name)(*_plain(arguments))
-
-
-# numpy forgets an exception within == and !=
-for _name in ("bool", "complex", "contains", "copy", "deepcopy", "eq", "float", "format", "index", "int", "iter", "ne", "reduce", "reduce_ex", "repr",
-              "str"):
-    setattr(View, f"__{_name}__", _guarded(f"__{_name}__"))
-
-
-def _refuse_stale(view):
-    owner = np.ndarray.__getattribute__(view, "_owner")
-    if owner is not None and owner.mark != np.ndarray.__getattribute__(view, "_mark"):
-        raise StaleArray("this array of bodies is of a step that is over; expected one that is taken anew, or a copy: numpy.array(...)")
-
-
-def _view(array, owner):
-    """An array as it is handed out, which is not to be written to, since nobody would notice."""
-    array.flags.writeable = False
-    view = array.view(View)
-    view._owner, view._mark = owner, owner.mark
-    return view
-
-
-def _plain(value):
-    """Views in arguments as arrays of numpy."""
-    if isinstance(value, View):
-        _refuse_stale(value)
-        return np.ndarray.view(value, np.ndarray)
-    if isinstance(value, (list, tuple)):
-        return type(value)(_plain(one) for one in value)
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    return value
 
 
 class _Memory:
@@ -96,28 +27,6 @@ class _Memory:
 
     def __init__(self, address, shape, kind):
         self.__array_interface__ = {"data": (address, True), "shape": shape, "typestr": kind, "version": 3}
-
-
-#: kinds of arrays whose values are no numbers, although numpy makes numbers of some of them
-NO_NUMBERS = "USVmM"
-
-
-def _reals(values, what, shape=None):
-    """An array of doubles, of a shape where one is asked for."""
-    if isinstance(values, np.ma.MaskedArray):
-        raise SimulationError(f"{what}: a masked array; expected numbers for all entries")
-    try:
-        found = np.asarray(_plain(values))
-        if found.dtype.kind == "c":
-            raise SimulationError(f"{what}: an array of complex numbers; expected real ones")
-        if found.dtype.kind in NO_NUMBERS or (found.dtype.kind == "O" and any(np.asarray(one).dtype.kind in NO_NUMBERS for one in found.flat)):
-            raise SimulationError(f"{what}: expected numbers")
-        found = np.array(found, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise SimulationError(f"{what}: expected numbers") from None
-    if shape is not None and found.shape != shape:
-        raise SimulationError(f"{what}: an array of shape {found.shape}; expected {shape}")
-    return found
 
 
 class Subdomain:
@@ -138,15 +47,15 @@ class Subdomain:
 
     def _copy(self, name, columns=slice(None)):
         # whole rows are copied three times as fast as some of their columns
-        return _view(np.array(self._field(name))[:, columns], self._simulation)
+        return read_only(np.array(self._field(name))[:, columns], self._simulation)
 
     def _whole(self, name, values):
         """The field of the library that an array belongs to, and what it will be."""
         if name == "force":
-            return name, _reals(values, name, (len(self), self._simulation.dimension))
+            return name, reals(values, name, (len(self), self._simulation.dimension))
         whole = np.array(self._field("velocity"))
         columns = slice(None, self._simulation.dimension) if name == "velocity" else slice(self._simulation.dimension, None)
-        whole[:, columns] = _reals(values, name, whole[:, columns].shape)
+        whole[:, columns] = reals(values, name, whole[:, columns].shape)
         return "velocity", whole
 
     def _call(self, function, field, values):
@@ -226,13 +135,13 @@ class Bodies:
         arrays = [getattr(one, name) for one in self._subdomains]
         if not arrays:
             return np.zeros((0, self._columns[name]) if name in self._columns else 0)
-        return arrays[0] if len(arrays) == 1 else _view(np.concatenate(arrays), arrays[0]._owner)
+        return arrays[0] if len(arrays) == 1 else read_only(np.concatenate(arrays), arrays[0]._owner)
 
     def __setattr__(self, name, values):
         if getattr(getattr(Subdomain, name, None), "fset", None) is None:
             raise AttributeError(f"array {name} of bodies cannot be set; expected one of velocity, spin, force")
         counts = [len(one) for one in self._subdomains]
-        values = _reals(values, name)
+        values = reals(values, name)
         if values.shape != (sum(counts), self._columns[name]):
             raise SimulationError(f"{name}: an array of shape {values.shape}; expected ({sum(counts)}, {self._columns[name]}), a row for "
                                   "each body of this rank")
@@ -242,55 +151,6 @@ class Bodies:
         for function in ("check_array", "set_array"):
             for one, field, whole in wholes:
                 one._call(function, field, whole)
-
-
-class Boundary:
-    """A boundary: `position`, `normal`, `velocity`, `spin`, `force` of the grains on it in the last step, `applied_force`, `pressure` and
-    `friction`. velocity, spin, applied_force, pressure and friction can be set, on all ranks alike, and hold from the next step on."""
-
-    def __init__(self, simulation, number, name):
-        object.__setattr__(self, "_place", (simulation, number))
-        object.__setattr__(self, "name", name)
-
-    def __getattr__(self, what):
-        if what not in BOUNDARY_READS:
-            raise AttributeError(f"no {what} of a boundary; expected one of {', '.join(BOUNDARY_READS)}")
-        values, count = (ctypes.c_double * 3)(), ctypes.c_int()
-        simulation, number = self._place
-        call("get_boundary", simulation.handle, number, what.encode(), values, ctypes.byref(count))
-        if what in ("pressure", "friction") or (what == "spin" and count.value == 1):
-            return values[0]
-        return np.array(values[:count.value])
-
-    def __setattr__(self, what, values):
-        if what not in BOUNDARY_SETS:
-            raise AttributeError(f"{what} of a boundary cannot be set; expected one of {', '.join(BOUNDARY_SETS)}")
-        values = _reals(values, f"boundary '{self.name}': {what}").ravel()
-        simulation, number = self._place
-        call("set_boundary", simulation.handle, number, what.encode(), values.ctypes.data, len(values))
-
-
-BOUNDARY_SETS = ("velocity", "spin", "applied_force", "pressure", "friction")
-BOUNDARY_READS = ("position", "normal", "force", *BOUNDARY_SETS)
-
-
-class Boundaries:
-    """Boundaries by name."""
-
-    def __init__(self, simulation):
-        self._simulation = simulation
-
-    def __len__(self):
-        return self._simulation.whole("boundaries")
-
-    def __iter__(self):
-        handle = self._simulation.handle
-        return iter([load().gravier_boundary_name(handle, k).decode() for k in range(len(self))])
-
-    def __getitem__(self, name):
-        number = ctypes.c_int()
-        call("boundary", self._simulation.handle, str(name).encode(), ctypes.byref(number))
-        return Boundary(self._simulation, number.value, name)
 
 
 class Simulation:
@@ -383,7 +243,7 @@ class Simulation:
         return value.value
 
     def real(self, name):
-        """A real number by its name in gravier.h."""
+        """A real number by its name in gravier.h, or by that of a column that &output adds to history.csv, as of the last step."""
         value = ctypes.c_double()
         call("real", self.handle, name.encode(), ctypes.byref(value))
         return value.value
@@ -427,6 +287,7 @@ class Simulation:
     converged = property(lambda self: bool(self.whole("converged")), doc="the solve of the last step has reached its goal")
     iterations = property(lambda self: self.whole("iterations"), doc="of the last step")
     contacts = property(lambda self: self.whole("contacts"), doc="of the last step, on all ranks")
+    cell = property(lambda self: Cell(self), doc="of the scene, where it moves or is sheared")
     kinetic_energy = property(lambda self: self.real("kinetic_energy"), doc="of all free bodies after the last step [J]")
 
     @property
@@ -436,7 +297,7 @@ class Simulation:
 
     @gravity.setter
     def gravity(self, values):
-        values = _reals(values, "gravity").ravel()
+        values = reals(values, "gravity").ravel()
         call("set_gravity", self.handle, values.ctypes.data, len(values))
 
     @property
@@ -446,34 +307,34 @@ class Simulation:
 
     @friction.setter
     def friction(self, value):
-        call("set_friction", self.handle, float(_reals(value, "friction", ())))
+        call("set_friction", self.handle, float(reals(value, "friction", ())))
 
     def add_bodies(self, position, radius, velocity=None, mass=None, material=None):
         """Let disks or spheres enter at the start of the next step, in free places; on all ranks alike. They get the next identifiers. Their mass
         is that of the density of the material unless it is given."""
-        position = _reals(position, "position")
+        position = reals(position, "position")
         if position.ndim != 2 or position.shape[1] != self.dimension:
             raise SimulationError(f"position: an array of shape {position.shape}; expected (bodies, {self.dimension})")
         n = len(position)
 
         def column(values, what, missing):
-            return np.full(n, missing, float) if values is None else np.ascontiguousarray(np.broadcast_to(_reals(values, what), n))
+            return np.full(n, missing, float) if values is None else np.ascontiguousarray(np.broadcast_to(reals(values, what), n))
 
         try:
             # A mass of 0 means to the library that none is given. One that is given as 0 is passed as NaN, which the library refuses.
-            given = None if mass is None else np.where(_reals(mass, "mass") == 0.0, np.nan, _reals(mass, "mass"))
+            given = None if mass is None else np.where(reals(mass, "mass") == 0.0, np.nan, reals(mass, "mass"))
             radius, mass, material = column(radius, "radius", 0.0), column(given, "mass", 0.0), column(material, "material", 1.0)
         except ValueError:
             raise SimulationError(f"radius, mass, material: expected one number, or one for each of {n} bodies") from None
         if not (np.isfinite(material).all() and (material == np.round(material)).all() and (np.abs(material) < 2**31).all()):
             raise SimulationError("material: expected whole numbers")
-        velocity = np.zeros_like(position) if velocity is None else _reals(velocity, "velocity", position.shape)
+        velocity = np.zeros_like(position) if velocity is None else reals(velocity, "velocity", position.shape)
         material = material.astype(np.int32)
         call("add_bodies", self.handle, n, *(array.ctypes.data for array in (radius, mass, material, position, velocity)))
 
     def remove(self, ids):
         """Take free bodies out of the scene at the start of the next step; on all ranks alike."""
-        ids = np.atleast_1d(np.array(_plain(ids)))
+        ids = np.atleast_1d(np.array(plain(ids)))
         if ids.ndim != 1 or (ids.size and ids.dtype.kind not in "iu"):
             raise SimulationError("remove: expected identifiers, which are whole numbers")
         for number in ids[(ids < 0) | (ids > np.iinfo(np.int64).max)] if ids.size else ():
@@ -490,7 +351,7 @@ class Simulation:
         return self._reduced("highest", values)
 
     def _reduced(self, name, values):
-        found = _reals(values, name)
+        found = reals(values, name)
         shape, found = found.shape, found.ravel()
         getattr(load(), "gravier_" + name)(self.handle, len(found), found.ctypes.data)
         return found.reshape(shape) if shape else float(found[0])
