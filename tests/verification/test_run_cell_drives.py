@@ -100,6 +100,8 @@ class CellDrives(CellTestCase):
                  "case.nml: &time stop_cell_shear: expected 0 for components of the cell that neither a key of &scene nor cell.csv moves"),
                 ("time,pressure_y\n0,1\n", {"scene": {"period": [7.6, 0.0]}},
                  "case.nml: &scene cell_strain_rate, or a stress in its place: expected a period along y"),
+                ("time,shear_rate_xy\n0,1\n", {"scene": {"period": [7.6, 0.0]}},
+                 "case.nml: &scene cell_shear_rate, or a stress in its place: expected a period along y"),
                 ("time,pressure_y\n0,1\n", {"solver": {"method": "newton"}},
                  "case.nml: &solver method = 'newton': expected a method that sweeps where stresses drive the cell in a periodic cell that moves")):
             write(os.path.join(here, "cell.csv"), table)
