@@ -34,6 +34,7 @@ contains
       call expect_own_name(report, "region", names(:i), error)
       call check_box(report, config%scene%dimension, config%regions(i), error)
       call check_bins(report, config%scene%dimension, config%regions(i), error)
+      call check_samples(report, config%output%every, config%regions(i), error)
       if (allocated(error)) return
     end do
     report%instance = 1
@@ -75,5 +76,19 @@ contains
     if (region%axis_given) call miss(report, "region", "bins", error, "axis")
     call expect(report, nd == 3 .or. region%axis /= "z", "region", "axis", error, "'x' or 'y' in 2D")
   end subroutine check_bins
+
+  !> Samples that come at least once from one written state to the next.
+  subroutine check_samples(report, every, region, error)
+    type(report_t), intent(in) :: report
+    !> steps from one written state to the next, 0: the last one alone
+    integer, intent(in) :: every
+    type(region_config_t), intent(in) :: region
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (.not. region%sample_every_given) return
+    call expect(report, region%sample_every >= 1, "region", "sample_every", error)
+    call expect(report, every == 0 .or. region%sample_every <= every, "region", "sample_every", error, "at most the steps "// &
+                "between two written states, here "//shown_text(report, "output", "every"))
+  end subroutine check_samples
 
 end module gravier_config_check_region

@@ -330,7 +330,10 @@ module gravier_config_table
            count=3, unit="m", note="no side"), &
      key_t("region", "bins", kind_integer, "1", "from 1 to 10000", &
            "bins of equal width along `axis`, whose means are in each written state", note="none"), &
-     key_t("region", "axis", kind_choice, "''", "x y z", "axis along which there are `bins`", note="none")]
+     key_t("region", "axis", kind_choice, "''", "x y z", "axis along which there are `bins`", note="none"), &
+     key_t("region", "sample_every", kind_integer, "1", ">= 1", &
+           "steps from one sample to the next, of which the figures of a written state are the mean since the last one", &
+           note="none: figures of the step itself")]
   !&>
 
   !> all keys, once `fill_keys` was called

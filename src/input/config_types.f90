@@ -327,6 +327,9 @@ module gravier_config_types
     !> of a profile
     integer :: bins
     logical :: bins_given = .false.
+    !> steps between samples of the bins
+    integer :: sample_every
+    logical :: sample_every_given = .false.
     !> x, y, z or blank
     character(len=choice_length) :: axis
     logical :: axis_given = .false.

@@ -16,6 +16,7 @@ module gravier_checkpoint
   use gravier_fallback, only: fallback_words, fallback_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
+  use gravier_region_means, only: region_means_t, regions_key, samples_record
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   use gravier_partition, only: head_words, head_record
   use gravier_simulation, only: simulation_t
@@ -54,6 +55,7 @@ contains
           & to_text(features%n_words)//" words"//newline
       end associate
     end do
+    text = text//"regions: "//samples_record//newline
     text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
     text = text//"files: names"//newline//"loop: names of settings"//newline
     text = text//"partition: "//head_record//", "//to_text(head_words)//" words; division"
@@ -126,6 +128,7 @@ contains
     words = real_words(simulation%boundary_impulses, size(simulation%boundary_impulses))
     call file%write_array("boundary_impulses", words, error)
     call save_diagnostics(simulation%diagnostics, file, error)
+    call save_samples(simulation%diagnostics, file, error)
     call simulation%decomposition%partition%get_head(words)
     call file%write_array("partition", words, error)
     call file%write_text("division", simulation%division%text(), error)
@@ -201,6 +204,7 @@ contains
     call load_grains(simulation, file, path, builds, error)
     if (.not. allocated(error)) call simulation%start_diagnostics()
     call load_diagnostics(simulation%diagnostics, file, error)
+    call load_samples(simulation%diagnostics, file, error)
     call file%close(error)
   end subroutine load_checkpoint
 
@@ -264,6 +268,42 @@ contains
       end associate
     end do
   end subroutine load_diagnostics
+
+  !> Samples of regions that no state has been written of yet; no words where there are no regions.
+  subroutine save_samples(diagnostics, file, error)
+    type(diagnostics_t), intent(in) :: diagnostics
+    type(checkpoint_file_t), intent(inout) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: words(:)
+    integer :: place
+
+    place = diagnostics%place(regions_key)
+    allocate (words(0))
+    if (place > 0) then
+      select type (means => diagnostics%asked(place)%diagnostic)
+      type is (region_means_t)
+        call means%get_samples(words)
+      end select
+    end if
+    call file%write_array("region_samples", words, error)
+  end subroutine save_samples
+
+  subroutine load_samples(diagnostics, file, error)
+    type(diagnostics_t), intent(inout) :: diagnostics
+    type(checkpoint_file_t), intent(in) :: file
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8), allocatable :: words(:)
+    integer :: place
+
+    call file%read_array("region_samples", 0, huge(1), words, error)
+    if (allocated(error)) return
+    place = diagnostics%place(regions_key)
+    if (place == 0) return
+    select type (means => diagnostics%asked(place)%diagnostic)
+    type is (region_means_t)
+      call means%set_samples(words)
+    end select
+  end subroutine load_samples
 
   !> The cell now, and as it was when the lists were made.
   pure function cell_words(simulation) result(words)

@@ -34,6 +34,7 @@ contains
         region%upper(:) = given%upper
         region%bins = merge(given%bins, 0, given%bins_given)
         region%axis = index(axes, trim(given%axis))
+        region%sample_every = merge(given%sample_every, 0, given%sample_every_given)
       end associate
     end do
     call move_alloc(means, more(1)%diagnostic)

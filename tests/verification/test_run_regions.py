@@ -4,17 +4,31 @@ fraction, plugs and shear, parts of disks and balls between sides, the sum of bi
 Static columns are solved to a residual of 1e-13, and their forces are exact to about 1e-10 of the largest. Sums of volumes and velocities
 are exact to rounding, some units of the last place of what is added up."""
 import os
+import signal
+import subprocess
+import sys
 import unittest
 
 import numpy as np
 
-from gravier_runs import RunTestCase, differences, gravier, merged, namelist, run_case, steps_of, write
+from gravier_runs import SOURCE, RunTestCase, differences, gravier, merged, namelist, run_case, steps_of, write
 import gravier as package
 
 G = 9.81
 R = 0.01
 MASS = 0.5
 AXES = "xyz"
+#: a run that the system ends two steps after a checkpoint
+KILLED = """
+import os
+import signal
+import gravier
+
+s = gravier.Simulation("case.nml", quiet=True)
+while s.made < 15:
+    s.step()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
 
 
 def grains(path, positions, velocities=None, radius=R):
@@ -270,6 +284,53 @@ class Regions(RunTestCase):
 
     # ---- what is off, and what is wrong
 
+    def test_samples(self):
+        """Bins of a region that is sampled are the means of the steps sampled since the last written state and of that of the state, of which a
+        run that writes each step has the figures: velocities weighted by mass, stresses by volume. They are the same bits on two ranks, and
+        after a kill between two states."""
+        for dimension in (2, 3):
+            case = self.stirred(dimension)
+            sampled = merged(case, {"region": [{**region, "sample_every": 3} for region in case["region"]],
+                                    "time": {"steps": 20}, "output": {"every": 8, "checkpoint_every": 13}})
+            each = self.play(f"each step {dimension}", merged(case, {"time": {"steps": 20}, "output": {"every": 1}}))
+            runs = [self.play(f"sampled {dimension}", sampled), self.play(f"sampled on two {dimension}", sampled, ranks=2)]
+            here = self.here(f"killed {dimension}")
+            os.makedirs(here)
+            write(os.path.join(here, "case.nml"), namelist(sampled))
+            killed = subprocess.run([sys.executable, "-c", KILLED], cwd=here, env={**os.environ, "PYTHONPATH": os.path.join(SOURCE, "drivers/python")},
+                                    stderr=subprocess.PIPE, text=True, check=False)
+            self.assertEqual(killed.returncode, -signal.SIGKILL, killed.stderr)
+            runs.append(gravier("--restart", "case.nml", ranks=1, directory=here))
+            self.assert_status(runs[2], 0)
+            for region in case["region"]:
+                name, last = region["name"], 0
+                for state in (8, 16, 20):
+                    taken = sorted({step for step in range(last + 1, state + 1) if step % 3 == 0} | {state})
+                    last = state
+                    found = self.region(runs[0], name, state)
+                    self.assertEqual(list(found.samples), [len(taken)] * len(found.samples))
+                    self.compare_samples(found, [self.region(each, name, step) for step in taken])
+                    for other in runs[1:]:
+                        for key, values in found.items():
+                            np.testing.assert_array_equal(self.region(other, name, state)[key], values, f"{name} {state} {key}")
+
+    def compare_samples(self, found, one):
+        """Means over steps against those of each step. The mass in a bin is told by its momentum alone, so that of equal grains its solid
+        fraction stands for it."""
+        weight = np.array([state.solid_fraction * state.volume for state in one])
+        for key in ("volume", "grains", "lower", "upper"):
+            np.testing.assert_allclose(found[key], np.mean([state[key] for state in one], axis=0), rtol=1e-12, atol=1e-12, err_msg=key)
+        whole = weight.sum(axis=0)
+        for key in ("velocity", "granular_temperature"):
+            values = np.array([state[key] for state in one])
+            mean = np.einsum("sk,sk...->k...", weight, values) / np.where(whole > 0.0, whole, 1.0).reshape(-1, *[1] * (values.ndim - 2))
+            np.testing.assert_allclose(found[key], mean, rtol=1e-9, atol=1e-12, err_msg=key)
+        volume = np.array([state.volume for state in one])
+        np.testing.assert_allclose(found.solid_fraction, whole / volume.sum(axis=0), rtol=1e-12)
+        stress = np.array([state.stress for state in one])
+        np.testing.assert_allclose(found.stress, np.einsum("sk,skab->kab", volume, stress) / volume.sum(axis=0)[:, None, None], rtol=1e-9,
+                                   atol=1e-12 * np.abs(stress).max())
+
     def test_off(self):
         """A scene without regions has no columns and no groups more, and one with them nothing else that differs."""
         case = self.stirred(2)
@@ -317,6 +378,9 @@ class Regions(RunTestCase):
             "&region (the 1st, 'a') bins = 0: expected an integer from 1 to 10000": [{**box, "bins": 0, "axis": "x"}],
             "&region (the 1st, 'a') bins = 10001: expected an integer from 1 to 10000": [{**box, "bins": 10001, "axis": "x"}],
             "&region (the 1st, 'a') axis = 'z': expected 'x' or 'y' in 2D": [{**box, "bins": 3, "axis": "z"}],
+            "&region (the 1st, 'a') sample_every = 0: expected an integer >= 1": [{**box, "sample_every": 0}],
+            "&region (the 1st, 'a') sample_every = 2: expected at most the steps between two written states, here every = 1":
+                [{**box, "sample_every": 2}],
             "&region 'a': from 0.000E+00 m to 5.000E-01 m along x: expected a region with an inside, no longer than the period, 4.000E-01 m":
                 [{**box, "upper": [0.5, 0.1]}],
             "&region 'a': from 6.000E-01 m to 4.000E-01 m along x: expected a region with an inside": [{"name": "a", "lower": [0.6]}],

@@ -22,6 +22,8 @@ module gravier_mean_region
     real(dp) :: lower(3) = -unbounded, upper(3) = unbounded
     !> axis along which there are bins, and how many; 0: none
     integer :: axis = 0, bins = 0
+    !> steps from one sample of the bins to the next, of which the bins of a written state are the mean; 0: they are of its step
+    integer :: sample_every = 0
   contains
     procedure :: make_grid => mean_region_make_grid
   end type mean_region_t

@@ -1,6 +1,6 @@
 !> Means over regions of a scene and profiles along an axis: solid fraction, velocity, granular temperature, stress, contacts.
 module gravier_region_means
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
@@ -10,33 +10,20 @@ module gravier_region_means
   use gravier_contact_branch, only: find_branch
   use gravier_scene_extent, only: find_extent
   use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t
+  use gravier_region_samples, only: region_samples_t, region_figures_t, sum_rows, centres, volume, mass, energy, ends, holders, &
+    & momentum
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
-  public :: region_means_t, region_figures_t, regions_key
+  public :: region_means_t, regions_key, samples_record
 
   !> by which the diagnostic is found among others; groups of the input ask for it, not a key of &output
   character(len=*), parameter :: regions_key = "region"
 
-  !> Figures of the bins of a region, the same on every rank.
-  type :: region_figures_t
-    integer :: n = 0
-    !> corners (nd, n) [m]; volume (n) [m^3, m^2 in 2D]
-    real(dp), allocatable :: lower(:, :), upper(:, :), volume(:)
-    !> free grains whose centres are inside (n)
-    real(dp), allocatable :: grains(:)
-    !> volume of the grains inside over that of the bin (n)
-    real(dp), allocatable :: solid_fraction(:)
-    !> of the mass of free grains inside (nd, n) [m/s], and the mean square of what their velocities differ from it, by axis
-    !> (n) [m^2/s^2]
-    real(dp), allocatable :: velocity(:, :), granular_temperature(:)
-    !> of the contact forces, compression positive; row: force, column: branch (nd, nd, n) [Pa, N/m in 2D]
-    real(dp), allocatable :: stress(:, :, :)
-    !> in which a free grain with its centre inside touches something (n)
-    real(dp), allocatable :: contacts_per_grain(:)
-  contains
-    procedure :: pressure => region_figures_pressure
-  end type region_figures_t
+  !> what the state of the samples is: the version of checkpoints, which changes with it
+  character(len=*), parameter :: samples_record = "measured; bins axis sample_every, steps, a bin sums volume lower upper"
+  !> words of a region that are not those of region_samples_t
+  integer, parameter :: region_words = 3
 
   type, extends(diagnostic_t) :: region_means_t
     type(mean_region_t), allocatable :: region(:)
@@ -44,18 +31,19 @@ module gravier_region_means
     type(region_figures_t), allocatable :: figures(:)
     !> of the free grains that reach into each region, as far as they do, where the run begins or goes on [kg]
     real(dp), allocatable :: mass_at_start(:)
+    !> bins of each region in the steps since a state was last written that were sampled
+    type(region_samples_t), private, allocatable :: samples(:)
+    !> steps that were measured
+    integer, private :: measured = 0
   contains
     procedure, nopass :: features => region_means_features
     procedure :: begin => region_means_begin
     procedure :: measure => region_means_measure
     procedure :: columns => region_means_columns
     procedure :: find_profiles => region_means_find_profiles
+    procedure :: get_samples => region_means_get_samples
+    procedure :: set_samples => region_means_set_samples
   end type region_means_t
-
-  !> rows of the sums of a bin: centres of free grains inside, volume of grains, mass of free grains, twice their kinetic energy
-  !> without spins; ends of contacts at free grains, and centres of these grains in the middle of the step; momentum (nd), stress
-  !> times volume and step (nd**2)
-  integer, parameter :: centres = 1, volume = 2, mass = 3, energy = 4, ends = 5, holders = 6, momentum = 6
 
 contains
 
@@ -82,23 +70,68 @@ contains
     call make_grids(self%region, decomposition, .false., grids)
     call sum_regions(grids, decomposition, sums)
     self%mass_at_start = sums(mass, :)
-    allocate (self%figures(size(self%region)))
+    allocate (self%figures(size(self%region)), self%samples(size(self%region)))
     do r = 1, size(self%region)
       call take_figures(grids(r), sums(:, r:r), 1.0_dp, self%figures(r))
+      call self%samples(r)%start(decomposition%nd, max(self%region(r)%bins, 1))
     end do
   end subroutine region_means_begin
 
-  !> Measure each region as a whole. Collective.
+  !> Measure each region as a whole, and sample the bins of those whose turn it is. Collective.
   subroutine region_means_measure(self, step)
     class(region_means_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
+    type(region_grid_t) :: grids(size(self%region))
+    real(dp), allocatable :: sums(:, :)
+    integer :: r
 
-    call find_figures(self%region, .false., step%decomposition, step%halo, step%problem, step%physics%h, self%figures)
+    call make_grids(self%region, step%decomposition, .false., grids)
+    call sum_regions(grids, step%decomposition, sums, step%halo, step%problem)
+    do r = 1, size(grids)
+      call take_figures(grids(r), sums(:, r:r), step%physics%h, self%figures(r))
+    end do
+    self%measured = self%measured + 1
+    call sample(self, step%decomposition, step%halo, step%problem, written=.false.)
   end subroutine region_means_measure
 
-  !> The bins of each region in a step that was solved last, whose halo and problem are still there. Collective.
+  !> Add the bins of the step that was solved last to the samples of regions: where a state is written, of those that do not have it
+  !> yet, else of those whose turn it is. Collective.
+  subroutine sample(self, decomposition, halo, problem, written)
+    class(region_means_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(halo_t), intent(in) :: halo
+    type(contact_problem_t), intent(in) :: problem
+    logical, intent(in) :: written
+    type(mean_region_t) :: due(size(self%region))
+    type(region_grid_t) :: grids(size(self%region))
+    real(dp), allocatable :: sums(:, :)
+    integer :: place(size(self%region)), r, n, k, first
+    logical :: sampled
+
+    n = 0
+    do r = 1, size(due)
+      sampled = self%region(r)%sample_every > 0
+      if (sampled) sampled = mod(self%measured, self%region(r)%sample_every) == 0
+      if (written) sampled = .not. sampled .or. self%samples(r)%n == 0
+      if (.not. sampled) cycle
+      n = n + 1
+      place(n) = r
+      due(n) = self%region(r)
+    end do
+    if (n == 0) return
+    call make_grids(due(1:n), decomposition, .true., grids(1:n))
+    call sum_regions(grids(1:n), decomposition, sums, halo, problem)
+    first = 1
+    do k = 1, n
+      call self%samples(place(k))%add(grids(k), sums(:, first:first + grids(k)%n - 1))
+      first = first + grids(k)%n
+    end do
+  end subroutine sample
+
+  !> The bins of each region when a state is written: of the step that was solved last, whose halo and problem are still there, or
+  !> the means of the samples since this was last called and of that step. Collective.
   subroutine region_means_find_profiles(self, decomposition, halo, problem, h, figures)
-    class(region_means_t), intent(in) :: self
+    class(region_means_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(halo_t), intent(in) :: halo
     type(contact_problem_t), intent(in) :: problem
@@ -106,10 +139,59 @@ contains
     real(dp), intent(in) :: h
     !> (regions)
     type(region_figures_t), allocatable, intent(out) :: figures(:)
+    integer :: r
 
     allocate (figures(size(self%region)))
-    call find_figures(self%region, .true., decomposition, halo, problem, h, figures)
+    call sample(self, decomposition, halo, problem, written=.true.)
+    do r = 1, size(figures)
+      call self%samples(r)%find_figures(h, figures(r))
+      call self%samples(r)%start(decomposition%nd, figures(r)%n)
+    end do
   end subroutine region_means_find_profiles
+
+  !> The samples that no state has been written of, bit by bit, and what they are samples of.
+  subroutine region_means_get_samples(self, words)
+    class(region_means_t), intent(in) :: self
+    integer(i8), allocatable, intent(out) :: words(:)
+    integer :: r, at, n
+
+    n = 1
+    do r = 1, size(self%region)
+      n = n + region_words + self%samples(r)%word_count()
+    end do
+    allocate (words(n))
+    words(1) = self%measured
+    at = 1
+    do r = 1, size(self%region)
+      words(at + 1) = self%region(r)%bins
+      words(at + 2) = self%region(r)%axis
+      words(at + 3) = self%region(r)%sample_every
+      at = at + region_words
+      n = self%samples(r)%word_count()
+      call self%samples(r)%get_state(words(at + 1:at + n))
+      at = at + n
+    end do
+  end subroutine region_means_get_samples
+
+  !> Take samples that `get_samples` gave. Those of other bins, or of other steps, are left: such a region begins anew.
+  subroutine region_means_set_samples(self, words)
+    class(region_means_t), intent(inout) :: self
+    integer(i8), intent(in) :: words(:)
+    integer :: r, at, n
+
+    if (size(words) == 0) return
+    self%measured = int(words(1))
+    at = 1
+    do r = 1, size(self%region)
+      n = self%samples(r)%word_count()
+      if (at + region_words + n > size(words)) return
+      if (words(at + 1) /= self%region(r)%bins .or. words(at + 2) /= self%region(r)%axis .or. &
+        & words(at + 3) /= self%region(r)%sample_every) return
+      at = at + region_words
+      call self%samples(r)%set_state(words(at + 1:at + n))
+      at = at + n
+    end do
+  end subroutine region_means_set_samples
 
   subroutine region_means_columns(self, list)
     class(region_means_t), intent(in) :: self
@@ -134,29 +216,20 @@ contains
     end do
   end subroutine region_means_columns
 
-  !> Figures of the regions as a whole, or of their bins. Collective.
-  subroutine find_figures(regions, binned, decomposition, halo, problem, h, figures)
-    type(mean_region_t), intent(in) :: regions(:)
-    logical, intent(in) :: binned
-    type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
-    type(contact_problem_t), intent(in) :: problem
+  !> Figures of the sums of one step.
+  subroutine take_figures(grid, sums, h, figures)
+    type(region_grid_t), intent(in) :: grid
+    !> (rows, n)
+    real(dp), intent(in) :: sums(:, :)
     !> [s]
     real(dp), intent(in) :: h
-    !> (regions)
-    type(region_figures_t), intent(inout) :: figures(:)
-    type(region_grid_t) :: grids(size(regions))
-    real(dp), allocatable :: sums(:, :)
-    integer :: r, first
+    type(region_figures_t), intent(out) :: figures
+    type(region_samples_t) :: one
 
-    call make_grids(regions, decomposition, binned, grids)
-    call sum_regions(grids, decomposition, sums, halo, problem)
-    first = 1
-    do r = 1, size(regions)
-      call take_figures(grids(r), sums(:, first:first + grids(r)%n - 1), h, figures(r))
-      first = first + grids(r)%n
-    end do
-  end subroutine find_figures
+    call one%start(grid%nd, grid%n)
+    call one%add(grid, sums)
+    call one%find_figures(h, figures)
+  end subroutine take_figures
 
   !> The space of each region in the scene as it is. Collective.
   subroutine make_grids(regions, decomposition, binned, grids)
@@ -185,7 +258,7 @@ contains
     real(dp), allocatable :: parts(:, :, :)
     integer :: s, r, first, rows, bins
 
-    rows = momentum + decomposition%nd + decomposition%nd**2
+    rows = sum_rows(decomposition%nd)
     bins = sum(grids%n)
     allocate (parts(rows, bins, size(decomposition%owned)), source=0.0_dp)
     do s = 1, size(decomposition%owned)
@@ -304,53 +377,5 @@ contains
     end subroutine add_one
 
   end subroutine add_contacts
-
-  !> From the sums of the bins of a region to their figures, which are 0 where there is nothing to divide by.
-  pure subroutine take_figures(grid, sums, h, figures)
-    type(region_grid_t), intent(in) :: grid
-    !> (rows, n)
-    real(dp), intent(in) :: sums(:, :)
-    !> [s]
-    real(dp), intent(in) :: h
-    type(region_figures_t), intent(out) :: figures
-    integer :: d, k, n, nd
-
-    nd = grid%nd
-    n = grid%n
-    figures%n = n
-    allocate (figures%lower(nd, n), figures%upper(nd, n), figures%solid_fraction(n), figures%velocity(nd, n), &
-      & figures%granular_temperature(n), figures%stress(nd, nd, n), figures%contacts_per_grain(n), figures%volume(n), source=0.0_dp)
-    figures%volume(:) = grid%volume
-    figures%grains = sums(centres, :)
-    do k = 1, n
-      figures%lower(:, k) = grid%lower
-      figures%upper(:, k) = grid%upper
-      figures%lower(grid%axis, k) = grid%side(k - 1)
-      figures%upper(grid%axis, k) = grid%side(k)
-      if (sums(holders, k) > 0.0_dp) figures%contacts_per_grain(k) = sums(ends, k)/sums(holders, k)
-      if (sums(mass, k) > 0.0_dp) then
-        figures%velocity(:, k) = sums(momentum + 1:momentum + nd, k)/sums(mass, k)
-        figures%granular_temperature(k) = max(sums(energy, k)/sums(mass, k) - sum(figures%velocity(:, k)**2), 0.0_dp)/nd
-      end if
-      if (.not. grid%volume > 0.0_dp) cycle
-      figures%solid_fraction(k) = sums(volume, k)/grid%volume
-      do d = 1, nd
-        figures%stress(:, d, k) = sums(momentum + d*nd + 1:momentum + d*nd + nd, k)/(h*grid%volume)
-      end do
-    end do
-  end subroutine take_figures
-
-  !> Mean of the diagonal of the stress in bin `k` [Pa, N/m in 2D].
-  pure real(dp) function region_figures_pressure(self, k) result(pressure)
-    class(region_figures_t), intent(in) :: self
-    integer, intent(in) :: k
-    integer :: d, nd
-
-    nd = size(self%velocity, 1)
-    pressure = 0.0_dp
-    do d = 1, nd
-      pressure = pressure + self%stress(d, d, k)/nd
-    end do
-  end function region_figures_pressure
 
 end module gravier_region_means

@@ -7,7 +7,8 @@ program test_region_means
   use gravier_mean_stress, only: mean_stress_t
   use gravier_scene_extent, only: find_extent
   use gravier_contact_branch, only: find_branch
-  use gravier_region_means, only: region_means_t, region_figures_t, regions_key
+  use gravier_region_samples, only: region_figures_t
+  use gravier_region_means, only: region_means_t, regions_key
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, check_close, check_equal, finish_checks
