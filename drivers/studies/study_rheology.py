@@ -29,18 +29,20 @@ COUNTS = {2: [14, 14], 3: [6, 10, 6]}
 SPACING = 1.28
 #: inertial numbers, each with the strain over which means are taken: slower flows take more steps
 NUMBERS = {2: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 6.4, 1e-2: 6.4, 3e-2: 6.4, 1e-1: 6.4},
-           3: {1e-4: 0.4, 3e-4: 0.4, 1e-3: 0.8, 3e-3: 0.8, 1e-2: 16.0, 3e-2: 16.0, 1e-1: 32.0, 3e-1: 32.0}}
+           3: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 0.8, 1e-2: 16.0, 3e-2: 16.0, 1e-1: 32.0, 3e-1: 32.0}}
 LEAST = {2: 1e-3, 3: 3e-3}
 QUICK = {2: {1e-2: 1.6, 1e-1: 1.6}, 3: {1e-1: 0.4}}
 #: flows up to here are slow: errors of their solves are compared with the rate times ten diameters, as between walls so far apart
 SLOW = 1e-3
+#: accuracy of slow flows of spheres, which Newton's method would have to solve to 0.1 step by step
+SLOW_ACCURACY = 0.3
 #: what the publications say of disks, and of slow flow of spheres
 DISKS = {"mu": (0.25, 1.1), "phi": (0.81, -0.3)}
 SPHERES = {"mu": 0.357, "phi": 0.596}
 #: accepted differences; that of the friction of the fastest flow, whose shocks are inelastic here
 NEAR, FAST, NEAR_FAST = {"mu": 0.05, "phi": 0.02}, 0.05, 0.12
-#: strain left out at the start
-START = 0.4
+#: strain left out at the start, from the lattice and from the state of a faster flow
+START, BEGUN = 0.4, 0.1
 
 
 def step_of(number):
@@ -49,28 +51,47 @@ def step_of(number):
     return 0.005 / np.sqrt(number) * min(1.0, 300.0 * number)
 
 
-def flow(folder, dimension, number, taken):
-    """Shear at an inertial number: mu, phi and the standard errors of both, from means over eight parts of the strain that is taken."""
+def flow(folder, dimension, number, taken, faster=None):
+    """Shear at an inertial number: mu, phi and the standard errors of both, from means over eight parts of the strain that is taken. It begins
+    with a loose lattice, or with the last state of a faster flow in its folder."""
     # grains of mean diameter 1 and of that mass, and P = 1
     density = {2: 4.0 / np.pi, 3: 6.0 / np.pi}[dimension]
     rate = number if dimension == 2 else number / np.sqrt(density)
     step = step_of(number)
     # the loose lattice comes together in some twenty units of time
-    steps = int(20.0 / step + (START + taken) / (rate * step))
-    groups = {"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "lattice", "lattice_count": COUNTS[dimension],
-                        "radius_min": 0.4, "radius_max": 0.6, "density": float(density), "friction": FRICTION[dimension],
-                        "period": [SPACING * n for n in COUNTS[dimension]], "cell_shear_rate": [float(rate)], "cell_pressure": [0.0, 1.0]},
+    start = 20.0 + START / rate if faster is None else BEGUN / rate
+    steps = int((start + taken / rate) / step)
+    groups = {"scene": {"dimension": dimension, "gravity": [0.0] * 3, "density": float(density), "friction": FRICTION[dimension],
+                        "cell_shear_rate": [float(rate)], "cell_pressure": [0.0, 1.0]},
               "time": {"step": float(step), "steps": steps}, "solver": {"max_iterations": 2000},
-              "output": {"directory": ".", "every": steps, "stress": True}}
+              "output": {"directory": ".", "every": steps, "stress": True, "final_bodies": True, "final_forces": True}}
+    if faster is None:
+        groups["scene"].update(bodies="lattice", lattice_count=COUNTS[dimension], radius_min=0.4, radius_max=0.6,
+                               period=[SPACING * n for n in COUNTS[dimension]])
+    else:
+        groups["scene"].update(bodies="file", bodies_file=str(faster.resolve() / "final_bodies.h5"))
     if number <= SLOW:
         groups["solver"]["velocity_scale"] = float(10.0 * rate)
+        if dimension == 3:
+            groups["solver"]["accuracy"] = SLOW_ACCURACY
     run(folder, groups)
     history = read_history(folder)
-    late = history["time"] * rate >= 20.0 * rate + START
+    late = history["time"] >= start
     parts = [np.array_split(history[name][late], 8) for name in ("stress_xy", "stress_yy", "solid_fraction")]
     mu = [-np.mean(a) / np.mean(b) for a, b in zip(parts[0], parts[1])]
     phi = [np.mean(c) for c in parts[2]]
     return np.mean(mu), np.mean(phi), np.std(mu, ddof=1) / np.sqrt(8.0), np.std(phi, ddof=1) / np.sqrt(8.0)
+
+
+def flows(folder, dimension, strains):
+    """(I, mu, phi, errors of both) of each inertial number of `strains`, in their order. Slow flows of spheres begin where the next faster one
+    of them has ended."""
+    found, faster = {}, None
+    for number in sorted(strains, reverse=True):
+        place = folder / f"{dimension}d_{number:g}"
+        found[number] = (number, *flow(place, dimension, number, strains[number], faster))
+        faster = place if dimension == 3 and number <= SLOW else None
+    return [found[number] for number in strains]
 
 
 def power_law(numbers, values, errors):
@@ -149,7 +170,7 @@ def main():
     found = {}
     for dimension in (2, 3):
         strains = QUICK[dimension] if options.quick else {number: taken for number, taken in NUMBERS[dimension].items() if number >= least[dimension]}
-        found[dimension] = [(number, *flow(options.out / f"{dimension}d_{number:g}", dimension, number, taken)) for number, taken in strains.items()]
+        found[dimension] = flows(options.out, dimension, strains)
     table = Table()
     compare(table, found)
     write_csv(options.out / "study_rheology.csv", {name: [row[k] for row in table.rows] for k, name in enumerate(table.HEADER)})

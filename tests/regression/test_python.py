@@ -107,6 +107,30 @@ class Package(RunTestCase):
         with self.assertRaisesRegex(gravier.ResultsError, "expected the results of a run"):
             gravier.Run(self.here("nowhere"))
 
+    def test_a_body_over_all_states(self):
+        """A body by its id, a row a written state; a grain that flies through a cell which is sheared has no jump in its places."""
+        body = self.run_.body(7)
+        np.testing.assert_array_equal(body.step, [0, 100, 200, 300])
+        np.testing.assert_array_equal(body.time, self.run_.times)
+        for k, step in enumerate(body.step):
+            bodies = self.run_.bodies(step)
+            for key in ("position", "velocity", "spin", "radius", "mass"):
+                np.testing.assert_array_equal(body[key][k], bodies[key][bodies.id == 7][0], f"{step} {key}")
+        self.assertEqual(len(body), 4)
+        with self.assertRaisesRegex(gravier.ResultsError, "no body 99 in the written states; expected an id of bodies()"):
+            self.run_.body(99)
+        write(self.here("flying.csv"), "id,x,y,radius,vx,vy\n3,0.5,0.5,0.01,2.0,3.0\n")
+        scene = {"bodies": "file", "bodies_file": self.here("flying.csv"), "gravity": [0.0, 0.0], "period": [1.0, 1.0]}
+        for name, moving in (("still", {}), ("sheared", {"cell_shear_rate": 0.5})):
+            gravier.run({"scene": {**scene, **moving}, "time": {"step": 0.01, "steps": 150}, "output": {"directory": ".", "every": 10}}, self.here(name))
+            flying = gravier.Run(self.here(name)).body(3)
+            self.assertEqual(len(flying), 16)
+            self.assertGreater(np.abs(flying.image).max(), 2)
+            ways = np.diff(flying.position, axis=0)
+            # a sheared cell carries it along in its first step
+            np.testing.assert_allclose(ways[1:], np.broadcast_to(ways[1], ways[1:].shape), atol=1e-7)
+            np.testing.assert_allclose(ways[1, 1], 0.3, atol=1e-7)
+
     def test_frames(self):
         """Components have the names of what they are along: axes, the normal and the tangents of a contact, the real part of a quaternion. A
         dictionary stands in for a table of pandas."""

@@ -149,6 +149,24 @@ class Run:
         shape (n), 0 for a disk or a sphere, else a row of `shapes` from 1 on, and orientation (n, 1 or 4)."""
         return self._split(self._group(step, "bodies"))
 
+    def body(self, number):
+        """A body, by its id, over the written states that have it, a row a state: step, time and the columns of `bodies`. In a periodic scene
+        position does not jump where the body crosses the cell."""
+        rows = []
+        for step, time in zip(self.steps, self.times):
+            bodies = self.bodies(step)
+            row = np.flatnonzero(bodies.id == number)
+            if len(row) == 0:
+                continue
+            one = {"step": step, "time": time, **{key: values[row[0]] for key, values in bodies.items()}}
+            if "image" in one:
+                cell = self.cell(step)
+                one["position"] = one["position"] + one["image"] @ (np.diag(self.period) if cell is None else cell.edge)
+            rows.append(one)
+        if not rows:
+            raise ResultsError(f"{self.path}: no body {number} in the written states; expected an id of bodies()")
+        return Table({key: np.array([one[key] for one in rows]) for key in rows[0] if all(key in one for one in rows)})
+
     def boundaries(self, step=None):
         """id, name, shape, position, normal, velocity, spin, force, a row each, and how they lie: edges (n, d - 1, d) where some are segments or
         rectangles, axis (n, d) where some are cylinders, axes (n, d, d) where some have facets."""
