@@ -18,6 +18,7 @@ module gravier_run_log
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning, fast_warning
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
+  use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
@@ -460,6 +461,7 @@ contains
       call write_lines(self, cost_lines(self%comm, simulation), "", error)
     end if
     call write_lines(self, population_lines(simulation), "", error)
+    call write_lines(self, cell_strain_lines(simulation), "", error)
     warnings = self%progress%warnings()
     if (warnings /= "") call self%line("warnings    "//warnings, error)
     call write_lines(self, summary_lines(self%comm, simulation, phases, seconds), "", error)

@@ -8,6 +8,7 @@ module gravier_start_lines
   use gravier_effects, only: effects_t, n_effects, effect_name_length
   use gravier_simulation, only: simulation_t
   use gravier_memory_report, only: item_bytes
+  use gravier_cell_lines, only: cell_start_lines
   implicit none
   private
   public :: banner_text, start_lines
@@ -41,7 +42,7 @@ contains
         & "effects     "//to_text(config%scene%dimension)//"D: "//effects_text(simulation%effects, .true.)//newline// &
         & "off         "//effects_text(simulation%effects, .false.)//newline// &
         & "unknowns    "//cost_text(simulation)//newline
-      text = text//mesh_lines(decomposition%boundaries)
+      text = text//cell_start_lines(simulation)//mesh_lines(decomposition%boundaries)
       if (config%solver%sleeping) text = text//"sleeping    bodies at rest for "//to_text(config%solver%sleep_after)// &
         & " steps stand still and leave the contact problem until something disturbs them"//newline
     end associate

@@ -62,7 +62,12 @@ class CellDrives(CellTestCase):
                 inertia = 0.25 * 5.0 * middle[component[1], component[1]]**2
                 self.assertAlmostEqual(now[component] - before[component], STEP * volume * force / inertia, delta=1e-12)
             np.testing.assert_allclose(next_edge, middle + 0.5 * STEP * next_velocity, rtol=0, atol=1e-12)
+        self.assertIn("\ncell        lengths [m]: x 1.000E+00, y 1.500E+00, z 8.000E-01; moved by strain_rate_x of the table, pressure_z of the table, "
+                      "shear_stress_xy of the table, shear_rate_yz of the table\n", run.stdout)
         history = run.history()
+        last = {name: f"{history[f'cell_{name}'][-1]:.3E}" for name in ("strain_x", "strain_y", "strain_z", "shear_xy", "shear_xz", "shear_yz")}
+        self.assertIn("\ncell        since the start of the scene strained by x {strain_x}, y {strain_y}, z {strain_z} and sheared by xy {shear_xy}, "
+                      "xz {shear_xz}, yz {shear_yz}\n".format(**last), run.stdout)
         for axis, name in enumerate("xyz"):
             lengths = np.array([edge[axis, axis] for edge, _ in state])
             np.testing.assert_allclose(history[f"cell_strain_{name}"], np.log(lengths[1:] / lengths[0]), rtol=0, atol=1e-14)
@@ -158,6 +163,7 @@ class CellDrives(CellTestCase):
                 np.testing.assert_allclose(off, np.round(off), rtol=0, atol=near)
             run = run_case(still, directory=here)
             self.assert_status(run, 0)
+            self.assertRegex(run.stdout, r"\ncell        lengths \[m\]: x .*; tilts \[m\]: xy .*; moved by nothing\n")
             found = gravier.BodiesFile(file)
             gradient = np.linalg.solve(cell.edge, cell.velocity).T
             bodies = found.bodies()
