@@ -204,6 +204,7 @@ class CellDrives(CellTestCase):
         form = ": expected rows with parts along their own axis and the axes before it alone, as far as these are periodic"
         for change, message in ((None, None), ({"velocity": None}, None), ({"edge": None}, "/box/edge: "),
                                 ({"edge": [[1.0, 0.1], [0.3, 2.0]]}, "/box/edge" + form), ({"velocity": [[0.0, 0.1], [0.0, 0.0]]}, "/box/velocity" + form),
+                                ({"edge": [[np.nan, 0.0], [0.3, 2.0]]}, "/box/edge: lengths along the axes that are not those of /box/period"),
                                 ({"edge": [[1.0, 0.0], [0.3, 2.5]]}, "/box/edge: lengths along the axes that are not those of /box/period"),
                                 ({"period": [1.0, 0.0], "edge": [[1.0, 0.0], [0.3, 0.0]]}, "/box/edge" + form),
                                 ({"edge": [[1.0, 0.0], [np.nan, 2.0]]}, "/box/edge: a number in it is none or too large"),

@@ -208,8 +208,8 @@ contains
     if (file%exists("/box/velocity")) call file%read_rows("/box/velocity", 0_i8, velocity, error)
     if (allocated(error)) return
     call split_edges(edge, length, bodies%tilt)
-    if (any(abs(length - bodies%period) > 0.0_dp)) call raise(error, status_input, path//": /box/edge: lengths along the axes "// &
-      & "that are not those of /box/period")
+    if (.not. all(abs(length - bodies%period) <= 0.0_dp)) call raise(error, status_input, path//": /box/edge: lengths "// &
+      & "along the axes that are not those of /box/period")
     call split_edges(velocity, bodies%length_rate, bodies%tilt_rate)
     if (has_other_parts(edge, bodies%period)) call raise(error, status_input, path//": /box/edge: expected "//form_of_edges)
     if (has_other_parts(velocity, bodies%period)) call raise(error, status_input, path//": /box/velocity: expected "//form_of_edges)
