@@ -30,7 +30,7 @@ SPACING = 1.28
 #: inertial numbers, each with the strain over which means are taken: slower flows take more steps
 NUMBERS = {2: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 6.4, 1e-2: 6.4, 3e-2: 6.4, 1e-1: 6.4},
            3: {1e-4: 0.4, 3e-4: 0.8, 1e-3: 1.6, 3e-3: 0.8, 1e-2: 16.0, 3e-2: 16.0, 1e-1: 32.0, 3e-1: 32.0}}
-LEAST = {2: 1e-3, 3: 3e-3}
+LEAST = {2: 1e-3, 3: 1e-3}
 QUICK = {2: {1e-2: 1.6, 1e-1: 1.6}, 3: {1e-1: 0.4}}
 #: flows up to here are slow: errors of their solves are compared with the rate times ten diameters, as between walls so far apart
 SLOW = 1e-3
@@ -156,7 +156,7 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/rheology"), help="default: out/rheology")
     parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and less strain")
     parser.add_argument("--least", type=float, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
-                        "numbers (1e-3 of disks, 3e-3 of spheres); the least there are is 1e-4")
+                        "numbers (1e-3); the least there are is 1e-4")
     options = parser.parse_args()
     if options.least and len(options.least) > 2:
         parser.error("--least takes one or two numbers")
