@@ -120,7 +120,7 @@ class CellDrives(CellTestCase):
 
     def test_states_of_a_cell_that_moves(self):
         """A cell in the middle of its motion goes on from a bodies file, that of the run or one of gravier.write_bodies, where its edges and
-        their velocities are: the same places after as many steps. Where nothing moves it any longer, its grains keep their velocities beside
+        their velocities are: the same places after as many steps, and tangential springs as far stretched. Where nothing moves it any longer, its grains keep their velocities beside
         its own."""
         packing = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.4, "radius_max": 0.6, "density": 1.0, "gravity": [0.0, 0.0],
                              "overlap_projection": False, "period": [7.6, 7.6], "cell_shear_rate": [0.3], "cell_pressure": [0.0, 1.0]},
@@ -129,7 +129,9 @@ class CellDrives(CellTestCase):
         space = {"scene": {"dimension": 3, "lattice_count": [4, 7, 4], "gravity": [0.0] * 3, "period": [5.1, 8.9, 5.1], "list_steps": 0.0,
                            "cell_shear_rate": [0.3, 0.0, 0.2], "cell_pressure": [0.0, 1.0, 0.0], "cell_strain_rate": [-0.03, 0.0, 0.0]},
                  "time": {"steps": 120}}
-        for name, case in (("plane", packing), ("space", merged(packing, space))):
+        springs = {"scene": {"wall_material": "m"}, "material": [{"name": "m"}], "time": {"step": 0.02, "steps": 800},
+                   "law": [{"materials": ["m"], "kind": "elastic", "normal_stiffness": 300.0, "friction": 0.4}]}
+        for name, case in (("plane", packing), ("space", merged(packing, space)), ("springs", merged(packing, springs))):
             split = case["time"]["steps"] - 10
             whole = run_case(case, directory=self.here(f"whole {name}"))
             first = run_case(merged(case, {"time": {"steps": split}}), directory=self.here(f"first {name}"))

@@ -64,6 +64,8 @@ contains
         law(:) = own%law(d, h, own%stretch(d - 1))
         sub%hot(q, row%compliance_t, g) = law(1)
         sub%hot(q, row%shift_t + d - 2, g) = law(2)
+        ! a cell that moves adds its own shift to that of the law
+        if (allocated(sub%cell%shift)) sub%cell%shift(d, c) = law(2)
       end do
     end associate
   end subroutine stretch_spring
