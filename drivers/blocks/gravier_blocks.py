@@ -15,7 +15,7 @@ try:
     import gravier.blocks as blocks
 except ImportError as missing:
     sys.exit(f"gravier_blocks: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
-from one_line import OneLineParser, plain  # noqa: E402
+from one_line import OneLineParser, plain, run_tool  # noqa: E402
 
 
 def parse(arguments):
@@ -86,4 +86,4 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_tool(main)

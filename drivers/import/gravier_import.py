@@ -22,7 +22,7 @@ except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from one_line import OneLineParser, plain  # noqa: E402
+from one_line import OneLineParser, plain, run_tool  # noqa: E402
 from whole_file import Locked, output_lock  # noqa: E402
 from case_files import write_files  # noqa: E402
 from datbox import read_bodies, read_bulk, read_contacts, read_initial, read_laws  # noqa: E402
@@ -125,4 +125,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_tool(main)

@@ -260,6 +260,8 @@ def draw_profile(run, name, steps, columns, mean):
     (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
     what = f"region {name}, step {steps[0]}" + (f" to {steps[-1]}: {'mean of ' if mean else ''}{len(steps)} states" if len(steps) > 1 else
                                                f", t = {run.time(steps[0]):.4g} s")
+    if "samples" in tables[-1]:
+        what += f", {'each ' if len(steps) > 1 else ''}a mean of {tables[-1].samples[0]} steps"
     figure.suptitle(what, fontsize=9, x=0.01, ha="left")
     if len(steps) > 1 and not mean:
         figure.colorbar(bar, ax=list(places), label="time [s]", aspect=35)

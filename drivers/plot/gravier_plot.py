@@ -16,7 +16,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
-from one_line import OneLineParser
+from one_line import OneLineParser, run_tool
 from packing_picture import COLOURS, draw_packing
 from picture_style import PictureError
 from whole_file import PICTURES, claim, save_figure
@@ -24,6 +24,8 @@ from whole_file import PICTURES, claim, save_figure
 
 #: along the longer side of a picture in dots: its memory is the square of them
 MOST_DOTS = 20000
+#: where the eye is unless told, degrees
+VIEW = (-60.0, 20.0)
 
 
 def refuse(message):
@@ -58,7 +60,7 @@ def parse(arguments):
     look.add_argument("--chains", action=argparse.BooleanOptionalAction,
                       help="lines from centre to centre as thick as the normal force; in 2D unless told, spheres become transparent")
     look.add_argument("--regions", action="store_true", help="outlines of the groups &region, with their bins, and &insertion")
-    look.add_argument("--view", type=float, nargs=2, default=(-60.0, 20.0), metavar=("AZIMUTH", "ELEVATION"),
+    look.add_argument("--view", type=float, nargs=2, metavar=("AZIMUTH", "ELEVATION"),
                       help="where the eye is in 3D, degrees (-60 20)")
     look.add_argument("--size", type=float, default=6.2, metavar="INCHES", help="longer side of the box (6.2)")
     packing = kinds.add_parser("packing", parents=[one, look], help="bodies, boundaries and force chains of a step")
@@ -83,8 +85,11 @@ def check(options):
     """Refuse values of options that are no picture's."""
     if options.kind == "movie" and not (options.every >= 1 and 0.0 < options.fps < numpy.inf):
         refuse(f"--every {options.every} --fps {options.fps:g}: expected 1 or more, and a number > 0")
-    if options.kind in ("packing", "movie") and not (0.0 < options.size <= 1000.0 and numpy.isfinite(options.view).all()):
-        refuse(f"--size {options.size:g} --view {options.view[0]:g} {options.view[1]:g}: expected a size above 0, 1000 at most, and two numbers")
+    if options.kind in ("packing", "movie"):
+        if not 0.0 < options.size <= 1000.0:
+            refuse(f"--size {options.size:g}: expected a size above 0, 1000 at most")
+        if options.view and not numpy.isfinite(options.view).all():
+            refuse(f"--view {options.view[0]:g} {options.view[1]:g}: expected two numbers")
     if options.kind == "packing" and not 1 <= options.dpi <= 10000:
         refuse(f"--dpi {options.dpi}: expected 1 to 10000")
     if options.kind == "movie" or (options.kind == "packing" and (options.out is None or options.out.suffix != ".svg")):
@@ -105,8 +110,11 @@ def draw(options):
     runs = [gravier.BodiesFile(directories[0])] if sample else [gravier.Run(directory) for directory in directories]
     if options.kind in ("packing", "movie") and options.colour is None:
         options.colour = "radius" if sample else "speed"
-    if options.kind in ("packing", "movie") and options.chains is None:
-        options.chains = runs[0].dimension == 2
+    if options.kind in ("packing", "movie"):
+        if options.view and runs[0].dimension == 2:
+            raise PictureError(f"{directories[0]}: a scene in the plane; expected no --view")
+        options.view = options.view or VIEW
+        options.chains = runs[0].dimension == 2 if options.chains is None else options.chains
     if options.kind == "packing":
         save(draw_packing(runs[0], options.step, options), out, options.dpi)
     elif options.kind == "movie":
@@ -132,4 +140,4 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    main()
+    run_tool(main)

@@ -19,7 +19,7 @@ import figures  # noqa: E402
 import page  # noqa: E402
 import verdict  # noqa: E402
 from asked import asked_rows, key_reference  # noqa: E402
-from one_line import OneLineParser, plain  # noqa: E402
+from one_line import OneLineParser, plain, run_tool  # noqa: E402
 from run_log import STATUSES, RunLog  # noqa: E402
 from whole_file import claim, written  # noqa: E402
 
@@ -199,4 +199,4 @@ def main(arguments=None):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_tool(main)

@@ -2,8 +2,10 @@
 import fcntl
 import math
 import os
+import signal
 import subprocess
 import sys
+import time
 
 import h5py
 import numpy as np
@@ -144,6 +146,24 @@ class Import(RunTestCase):
         done = convert()
         self.assertEqual(done.returncode, 0, done)
         self.assertEqual(sorted(os.listdir(folder)), ["case.h5", "case.nml"])
+
+    def test_ended_in_the_middle(self):
+        """SIGTERM and ^C while the program reads the case leave no draft and no traceback."""
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx")
+        box = self.box(2, body(2, 1, [0.0, 0.0], [("DISKx", "BLUEx", values(byrd=0.1))]), laws)
+        for number, status in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            folder = self.fresh("ended")
+            program = write(os.path.join(folder, "slow.sh"), "#!/bin/sh\n: > started\nexec sleep 100\n")
+            os.chmod(program, 0o755)
+            command = [sys.executable, IMPORT, box, "--step", "1e-3", "--out", "case"]
+            with subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True,
+                                  env={**ENVIRONMENT, **os.environ, "GRAVIER_PROGRAM": program}) as tool:
+                while tool.poll() is None and not any("started" in names for _, _, names in os.walk(folder)):
+                    time.sleep(0.02)
+                tool.send_signal(number)
+                said = tool.communicate()[1]
+            self.assertEqual((tool.returncode, said), (status, ""))
+            self.assertEqual(sorted(name for name in os.listdir(folder) if "started" not in name), ["slow.sh"])
 
     def test_a_settled_packing_stays_settled(self):
         """300 disks at rest, as LMGC90 would have written them (reference places and displacements, walls that are rectangles with

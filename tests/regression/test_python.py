@@ -434,6 +434,9 @@ class Package(RunTestCase):
                                    (("packing", "heap/results", "--size", "900"), "--size 900: 180000 dots at 200 an inch; expected 20000 at most"),
                                    (("movie", "heap/results", "--size", "900"), "--size 900: 90000 dots at 100 an inch; expected 20000 at most"),
                                    (("movie", "heap/results", "--every", "0"), "--every 0 --fps 10: expected 1 or more"),
+                                   (("packing", "heap/results", "--size", "0"), "--size 0: expected a size above 0, 1000 at most"),
+                                   (("packing", "heap/results", "--view", "nan", "0"), "--view nan 0: expected two numbers"),
+                                   (("packing", "heap/results", "--view", "0", "0"), "heap/results: a scene in the plane; expected no --view"),
                                    (("movie", "heap/results", "--out", "heap/case.nml/film.gif", "--every", "3"),
                                     "heap/case.nml/film.gif: File exists; expected a place for files")):
             status, said = self.plot(*arguments)
