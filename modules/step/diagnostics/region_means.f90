@@ -1,6 +1,7 @@
 !> Means over regions of a scene and profiles along an axis: solid fraction, velocity, granular temperature, stress, contacts.
 module gravier_region_means
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_communicator, only: communicator_t
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
@@ -180,7 +181,7 @@ contains
     integer :: r, at, n
 
     if (size(words) == 0) return
-    self%measured = int(words(1))
+    self%measured = narrow(words(1))
     at = 1
     do r = 1, size(self%region)
       n = self%samples(r)%word_count()

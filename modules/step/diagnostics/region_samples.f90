@@ -1,6 +1,7 @@
 !> Sums over the bins of a region in one step or in several ones, and the figures that they make: means of a step, or over steps.
 module gravier_region_samples
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_mean_region, only: region_grid_t
   implicit none
   private
@@ -178,7 +179,7 @@ contains
     integer(i8), intent(in) :: words(:)
     integer :: at, k
 
-    self%n = int(words(1))
+    self%n = narrow(words(1))
     at = 1
     do k = 1, size(self%volume)
       call take(self%sums(:, k))
