@@ -24,8 +24,6 @@ from whole_file import PICTURES, claim, save_figure
 
 #: along the longer side of a picture in dots: its memory is the square of them
 MOST_DOTS = 20000
-#: where the eye is unless told, degrees
-VIEW = (-60.0, 20.0)
 
 
 def refuse(message):
@@ -113,7 +111,6 @@ def draw(options):
     if options.kind in ("packing", "movie"):
         if options.view and runs[0].dimension == 2:
             raise PictureError(f"{directories[0]}: a scene in the plane; expected no --view")
-        options.view = options.view or VIEW
         options.chains = runs[0].dimension == 2 if options.chains is None else options.chains
     if options.kind == "packing":
         save(draw_packing(runs[0], options.step, options), out, options.dpi)

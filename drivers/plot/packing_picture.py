@@ -15,6 +15,7 @@ import gravier
 WIDEST = 4.0  # chain of the largest force, points
 FAINTEST = 0.02  # forces below this part of the largest are not drawn
 MOST_SHADED = 20000  # spheres that get a highlight each
+VIEW = (-60.0, 20.0)  # where the eye is unless told, degrees
 COLOURS = ("speed", "velocity_x", "velocity_y", "velocity_z", "rotation", "pressure", "radius", "material", "subdomain", "none")
 #: numbers of things, not quantities
 KINDS = ("material", "subdomain")
@@ -210,7 +211,7 @@ def draw_packing(run, step, options, frame=None):
     bodies, contacts = run.bodies(step), run.contacts(step)
     if len(bodies) == 0:
         raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
-    view, walls = View(run.dimension, *options.view), Walls(run, step)
+    view, walls = View(run.dimension, *options.view or VIEW), Walls(run, step)
     box = box_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
     low, high = view.extent(*box)
     size = (high - low) / (high - low).max()
