@@ -149,6 +149,11 @@ class Package(RunTestCase):
         self.assertEqual(" ".join(plane), "moment_z orientation origin corners_1x corners_1y corners_2x corners_2y stress_xx stress_xy stress_yx stress_yy")
         self.assertEqual(list(forces), ["moment_x", "moment_y", "moment_z"])
 
+    def test_frames_need_pandas(self):
+        with unittest.mock.patch.dict(sys.modules, {"pandas": None}):
+            with self.assertRaisesRegex(gravier.ResultsError, "^frame: there is no pandas; expected a python3 that has it, or the arrays of the table$"):
+                self.run_.bodies().frame()
+
     def test_tables_that_are_cut_off(self):
         """A last row without its end is left out, also where it has as many values; a row within that is short is an error."""
         for text, expected in (("a,b\n1,2\n3,4", [2.0]), ("a,b\n1,2\n3", [2.0]), ("a,b\n1,2\n3,4\n", [2.0, 4.0]), ("a,b\n", [])):

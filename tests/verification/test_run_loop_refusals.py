@@ -362,6 +362,20 @@ with gravier.Simulation(case) as s:
         self.assertRegex(done.stdout, r"^/absent/libgravier\.so: cannot load the library of Gravier: .*; expected libgravier\.so beside the program, "
                                       r"or its path in GRAVIER_LIBRARY\n$")
 
+    def test_a_library_of_another_version_is_told(self):
+        """One that lacks a function of the package, as where a new package finds an old build."""
+        compiler = os.environ.get("CC") or shutil.which("cc")
+        if not compiler:
+            self.skipTest("no compiler of C")
+        source, library = self.here("old.c"), self.here("libold.so")
+        with open(source, "w", encoding="ascii") as file:
+            file.write("int gravier_open(void) { return 0; }\n")
+        subprocess.run([compiler, "-shared", "-fPIC", source, "-o", library], check=True)
+        script = "import gravier\ntry:\n    gravier.Simulation('case.nml')\nexcept gravier.SimulationError as error:\n    print(error)\n"
+        done = subprocess.run([sys.executable, "-c", script], env={**os.environ, "GRAVIER_LIBRARY": library}, capture_output=True, text=True, check=True)
+        self.assertEqual(done.stdout, f"{library}: no function gravier_step: a library of another version; expected that of this package, built anew or "
+                                      "named by GRAVIER_LIBRARY\n")
+
     # ---- C and mpi4py
 
     def test_a_program_in_c(self):

@@ -58,7 +58,10 @@ def load():
         raise SimulationError(f"{path}: cannot load the library of Gravier: {' '.join(str(reason).split())}; expected {NAME} beside the "
                               "program, or its path in GRAVIER_LIBRARY", 4) from None
     for name, types in ARGUMENTS.items():
-        function = getattr(library, "gravier_" + name)
+        function = getattr(library, "gravier_" + name, None)
+        if function is None:
+            raise SimulationError(f"{path}: no function gravier_{name}: a library of another version; expected that of this package, built anew or "
+                                  "named by GRAVIER_LIBRARY", 4)
         function.argtypes = [TYPES[letter] for letter in types]
         function.restype = RESULTS.get(name, ctypes.c_int)
     atexit.register(library.gravier_finalize)

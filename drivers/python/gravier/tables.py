@@ -27,7 +27,10 @@ class Table(dict):
     def frame(self):
         """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner or edge 1 NAME_1y. Impulses
         and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""
-        import pandas
+        try:
+            import pandas
+        except ImportError:
+            raise ResultsError("frame: there is no pandas; expected a python3 that has it, or the arrays of the table") from None
 
         columns = {}
         for name, values in self.items():
