@@ -182,6 +182,24 @@ class OwnFiles(RunTestCase):
         with open(table, encoding="ascii") as file:
             self.assertRegex(file.read(), r"\A# checksum [0-9a-f]{16}\ntime,gx,gy\n0,0,-9\.81\n\Z")
 
+    def test_the_launcher_leaves_what_is_no_build(self):
+        """Files in the place of a build stay, and a link to the launcher builds where the launcher is, and not where the link is."""
+        tree, elsewhere = (os.path.join(os.path.realpath(self.work), name) for name in ("tree", "elsewhere"))
+        for place in (tree, elsewhere):
+            os.makedirs(os.path.join(place, "build/release"))
+            write(os.path.join(place, "build/release/mine.txt"), "mine")
+        shutil.copy(os.path.join(SOURCE, "gravier"), tree)
+        os.symlink("../tree/gravier", os.path.join(elsewhere, "gravier"))
+        os.symlink("gravier", os.path.join(elsewhere, "again"))
+        for launcher in (os.path.join(tree, "gravier"), os.path.join(elsewhere, "gravier"), os.path.join(elsewhere, "again")):
+            done = subprocess.run([launcher, "build"], cwd=elsewhere, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ})
+            self.assertEqual(done.returncode, 2, done)
+            self.assertIn(f"{tree}/build/release has files that are no build of Gravier: expected nothing there, or a build\n", done.stdout + done.stderr)
+            self.assertEqual(os.listdir(os.path.join(tree, "build/release")), ["mine.txt"])
+        self.assertEqual(sorted(os.listdir(elsewhere)), ["again", "build", "gravier"])
+        self.assertEqual(os.listdir(os.path.join(elsewhere, "build")), ["release"])
+        self.assertEqual(os.listdir(os.path.join(elsewhere, "build/release")), ["mine.txt"])
+
 
 if __name__ == "__main__":
     unittest.main()
