@@ -415,6 +415,9 @@ contains
           & to_text(duration_of(config), 6)//" s; it is "//to_text(duration_of(tight), 6)//" s")
       end do
     end do
+    if (allocated(error)) return
+    if (study%reference == "tight" .and. size(study%tight%changes) == 0) call raise(error, status_input, study%file// &
+      & ": group &reference is missing: expected keys of a run that is tighter than the others, or reference = 'none'")
   end subroutine try_cases
 
 end module gravier_accuracy_input
