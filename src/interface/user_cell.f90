@@ -3,27 +3,29 @@ module gravier_user_cell
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_input
   use gravier_magnitude, only: is_bounded, bounded_text
-  use gravier_cell_drive, only: cell_components, cell_component, component_row, component_column
+  use gravier_cell_drive, only: cell_components, cell_component, component_row, component_column, stress_sign
   use gravier_scene_cell, only: rate_columns, stress_columns
   use gravier_user_loop, only: user_loop_t, numbers_text
   implicit none
   private
   public :: get_cell, set_cell
 
-  character(len=*), parameter :: lengths(3) = ["length_x", "length_y", "length_z"], tilts(3) = ["tilt_xy", "tilt_xz", "tilt_yz"]
+  character(len=*), parameter :: lengths(3) = ["length_x", "length_y", "length_z"], tilts(3) = ["tilt_xy", "tilt_xz", "tilt_yz"], &
+    & strains(3) = ["strain_x", "strain_y", "strain_z"], shears(3) = ["shear_xy", "shear_xz", "shear_yz"]
   character(len=*), parameter :: still_text = "cell: that of the scene does not move; expected a periodic cell that moves in "// &
     & "the case"
 
 contains
 
-  !> A quantity of the cell now: a length or a tilt of its edges [m], a rate [1/s], or a stress that is held [Pa, N/m in 2D], 0
-  !> where a component has a rate. Failure (status_input): an unknown name, a cell that does not move.
+  !> A quantity of the cell now: a length or a tilt of its edges [m], a strain or a shear since the start of the scene, a rate
+  !> [1/s], or a stress that is held [Pa, N/m in 2D], 0 where a component has a rate. Failure (status_input): an unknown name, a cell
+  !> that does not move.
   subroutine get_cell(loop, name, value, error)
     type(user_loop_t), intent(in) :: loop
     character(len=*), intent(in) :: name
     real(dp), intent(out) :: value
     type(error_t), allocatable, intent(inout) :: error
-    real(dp) :: gradient(3, 3)
+    real(dp) :: gradient(3, 3), strain(3)
     integer :: c, k
 
     value = 0.0_dp
@@ -31,16 +33,19 @@ contains
       if (.not. simulation%decomposition%period%moves) call raise(error, status_input, still_text)
       if (allocated(error)) return
       gradient(:, :) = simulation%decomposition%period%gradient()
+      strain(:) = simulation%cell_strain()
       do k = 1, cell_components(nd)
         c = cell_component(k, nd)
         associate (a => component_row(c), b => component_column(c))
           if (name == rate_columns(c)) value = gradient(a, b)
-          if (name == stress_columns(c) .and. simulation%cell_drive%driven(a, b)) value = merge(1.0_dp, -1.0_dp, a == b)* &
+          if (name == stress_columns(c) .and. simulation%cell_drive%driven(a, b)) value = stress_sign(a, b)* &
             & simulation%cell_drive%stress(a, b)
           if (a == b) then
             if (name == lengths(c)) value = simulation%decomposition%period%length(c)
+            if (name == strains(c)) value = strain(c)
           else
             if (name == tilts(c - 3)) value = simulation%decomposition%period%tilt(c - 3)
+            if (name == shears(c - 3)) value = simulation%decomposition%period%shear(c - 3)
           end if
         end associate
       end do
@@ -66,7 +71,8 @@ contains
       do k = n, 1, -1
         if (name == rate_columns(cell_component(k, nd)) .or. name == stress_columns(cell_component(k, nd))) exit
       end do
-      if (k == 0) call raise(error, status_input, "cell: "//name//" cannot be set; expected one of"//settable(nd))
+      if (index(settable(nd)//",", " "//name//",") == 0) call raise(error, status_input, "cell: "//name//" cannot be set; "// &
+        & "expected one of"//settable(nd))
       if (.not. is_bounded(value)) call raise(error, status_input, "cell: "//name//" is not a number to reckon with; expected "// &
         & bounded_text)
       if (allocated(error)) return
@@ -86,7 +92,7 @@ contains
           & ": expected a pressure >= 0")
         if (allocated(error)) return
         if (is_rate) drive%rate(a, b) = value
-        if (.not. is_rate) drive%stress(a, b) = merge(value, -value, a == b)
+        if (.not. is_rate) drive%stress(a, b) = stress_sign(a, b)*value
       end associate
     end associate
     values(1) = value
@@ -109,8 +115,8 @@ contains
     names = settable(nd)
     do k = 1, cell_components(nd)
       c = cell_component(k, nd)
-      if (c <= 3) names = names//", "//trim(lengths(c))
-      if (c > 3) names = names//", "//trim(tilts(c - 3))
+      if (c <= 3) names = names//", "//trim(lengths(c))//", "//trim(strains(c))
+      if (c > 3) names = names//", "//trim(tilts(c - 3))//", "//trim(shears(c - 3))
     end do
     names = names(2:)
   end function known

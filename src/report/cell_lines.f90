@@ -2,7 +2,7 @@
 module gravier_cell_lines
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
-  use gravier_cell_drive, only: cell_components, cell_component, component_row, component_column
+  use gravier_cell_drive, only: cell_components, cell_component, component_row, component_column, stress_sign
   use gravier_scene_cell, only: rate_columns, stress_columns
   use gravier_simulation, only: simulation_t
   implicit none
@@ -46,7 +46,8 @@ contains
           else if (in_table(n + k)) then
             drives = drives//", "//trim(stress_columns(c))//" of the table"
           else if (drive%driven(a, b)) then
-            drives = drives//", "//trim(stress_columns(c))//" = "//to_text(abs(drive%stress(a, b)), digits)//unit(nd)
+            drives = drives//", "//trim(stress_columns(c))//" = "//to_text(stress_sign(a, b)*drive%stress(a, b), digits)// &
+              & unit(nd)
           else if (abs(drive%rate(a, b)) > 0.0_dp) then
             drives = drives//", "//trim(rate_columns(c))//" = "//to_text(drive%rate(a, b), digits)//" 1/s"
           end if

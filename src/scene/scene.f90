@@ -22,7 +22,7 @@ module gravier_scene
   use gravier_pair_laws, only: set_default_laws
   use gravier_method_choice, only: check_moments
   use gravier_cell_drive, only: cell_drive_t
-  use gravier_scene_cell, only: make_cell_drive, set_period, stop_cell, check_cell
+  use gravier_scene_cell, only: cell_moves, make_cell_drive, set_period, stop_cell, check_cell
   use gravier_known_column, only: what_else_acts
   use gravier_config_types, only: config_t, scene_config_t
   use gravier_config_laws, only: density_of, collect_laws
@@ -124,7 +124,7 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     call take_data(comm, config, data, scene)
-    if (.not. scene%period%moves) call stop_cell(scene%period, scene%grains)
+    if (.not. cell_moves(config%scene)) call stop_cell(scene%period, scene%grains)
     call check_moments(config, scene%effects, error)
     call check_shapes(config, scene, error)
     call check_places(comm, config, data, scene, error)

@@ -6,11 +6,12 @@ module gravier_scene_cell
   use gravier_periodic, only: period_t
   use gravier_body_store, only: body_set_t
   use gravier_bodies_data, only: bodies_data_t
-  use gravier_cell_drive, only: cell_drive_t, cell_components, cell_component, component_row, component_column, carry_bodies
+  use gravier_cell_drive, only: cell_drive_t, cell_components, cell_component, component_row, component_column, stress_sign, &
+    & carry_bodies
   use gravier_config_types, only: config_t, scene_config_t
   implicit none
   private
-  public :: make_cell_drive, set_period, stop_cell, check_cell, rate_columns, stress_columns
+  public :: cell_moves, make_cell_drive, set_period, stop_cell, check_cell, rate_columns, stress_columns
 
   character(len=1), parameter :: axes(3) = ["x", "y", "z"]
   !> columns of a table: the rate of a component, and the stress in its place
@@ -31,8 +32,7 @@ contains
       & any(config%cell_pressure > 0.0_dp) .or. any(abs(config%cell_shear_stress) > 0.0_dp) .or. config%cell_table /= ""
   end function cell_moves
 
-  !> What moves the cell. A shear stress drives the cell along itself: it is held where the contacts resist with a negative
-  !> component of the mean stress, in which compression is positive. Failure: status_input, of a table. Not collective.
+  !> What moves the cell. Failure: status_input, of a table. Not collective.
   subroutine make_cell_drive(config, drive, error)
     type(config_t), intent(in) :: config
     type(cell_drive_t), intent(out) :: drive
@@ -43,11 +43,11 @@ contains
       drive%inertia = scene%cell_inertia
       do d = 1, 3
         drive%rate(d, d) = scene%cell_strain_rate(d)
-        drive%stress(d, d) = scene%cell_pressure(d)
+        drive%stress(d, d) = stress_sign(d, d)*scene%cell_pressure(d)
         drive%driven(d, d) = scene%cell_pressure(d) > 0.0_dp
         associate (a => component_row(3 + d), b => component_column(3 + d))
           drive%rate(a, b) = scene%cell_shear_rate(d)
-          drive%stress(a, b) = -scene%cell_shear_stress(d)
+          drive%stress(a, b) = stress_sign(a, b)*scene%cell_shear_stress(d)
           drive%driven(a, b) = abs(scene%cell_shear_stress(d)) > 0.0_dp
         end associate
       end do

@@ -130,6 +130,7 @@ class Package(RunTestCase):
             # a sheared cell carries it along in its first step
             np.testing.assert_allclose(ways[1:], np.broadcast_to(ways[1], ways[1:].shape), atol=1e-7)
             np.testing.assert_allclose(ways[1, 1], 0.3, atol=1e-7)
+            np.testing.assert_allclose(10 * 0.01 * flying.velocity[2:], ways[1:], atol=1e-6)
 
     def test_frames(self):
         """Components have the names of what they are along: axes, the normal and the tangents of a contact, the real part of a quaternion. A

@@ -281,15 +281,19 @@ class Cell(CellTestCase):
             shutil.rmtree(os.path.join(here, "results"), ignore_errors=True)
 
     def test_shrunken(self):
-        """A cell that has become shorter than its pairs reach ends the run."""
+        """A cell that has become shorter than its pairs reach ends the run, and so does one that would have no length or a negative one."""
         here = self.here("shrunken")
         os.makedirs(here)
         write(os.path.join(here, "grains.csv"), bodies_csv([Grain([0.5, 0.5], radius=0.05)]))
-        run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "gravity": [0.0, 0.0], "period": [1.0, 1.0],
-                                  "cell_strain_rate": [0.0, -2.0]}, "time": {"step": STEP, "steps": 200},
-                        "output": {"directory": "results"}}, directory=here)
-        self.assert_status(run, 4)
-        self.assertRegex(run.stderr, r"step \d+: the periodic cell has shrunk to .* m; expected more than .* m along each axis")
+        for rate, line in ((-2.0, r"the periodic cell has shrunk to .* m; expected more than .* m along each axis"),
+                           *((-share / STEP, "the periodic cell shrinks by more than its length in this step; expected rates of strain, pressures "
+                              "and a &time step that shrink it little in a step") for share in (2.0, 2.5))):
+            run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv", "gravity": [0.0, 0.0], "period": [1.0, 1.0],
+                                      "cell_strain_rate": [0.0, rate]}, "time": {"step": STEP, "steps": 200},
+                            "output": {"directory": "results"}}, directory=here)
+            self.assert_status(run, 4)
+            self.assertRegex(run.stderr, r"step \d+: " + line)
+            shutil.rmtree(os.path.join(here, "results"))
 
 
 if __name__ == "__main__":

@@ -173,6 +173,7 @@ class CellDrives(CellTestCase):
             peculiar = bodies.velocity - (bodies.position - middle) @ gradient.T
             mass = bodies.mass
             self.assertLess(np.abs(run.results()["/steps/1/cell/velocity"]).max(), 1e-14)
+            np.testing.assert_array_equal(run.results()["/steps/1/cell/edge"], cell.edge)
             # contacts within the cell and across it change no momentum
             np.testing.assert_allclose(mass @ run.results()["/steps/1/bodies/velocity"][:, :len(middle)], mass @ peculiar, rtol=0, atol=1e-6 * mass.sum())
             # a cell that is sheared is no place for what one that moves has no room for, and has its own lengths

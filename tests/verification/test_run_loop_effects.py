@@ -254,19 +254,24 @@ with gravier.Simulation(case, quiet=True) as s:
     while s.goes_on:
         s.step()
     assert (s.cell.pressure_y, s.cell.shear_stress_xy, s.cell.pressure_x) == (2.0, -0.2, 0.0)
-    print(s.cell.strain_rate_x, s.cell.length_x, s.cell.length_y, s.cell.tilt_xy, s.cell.shear_rate_xy, s.real("stress_yy"))
+    print(s.cell.strain_rate_x, s.cell.length_x, s.cell.length_y, s.cell.tilt_xy, s.cell.shear_rate_xy, s.real("stress_yy"),
+          s.cell.strain_x, s.cell.strain_y, s.cell.shear_xy)
+    names = [name for name in dir(s.cell) if not name.startswith("_")]
+    assert len(names) == 12 and all(isinstance(getattr(s.cell, name), float) for name in names), names
+    assert not hasattr(s.cell, "length_z") and not hasattr(s.cell, "length_x ")
 """
         wanted = merged(case, {"scene": {"cell_pressure": [0.0, 2.0], "cell_shear_stress": [-0.2], "cell_strain_rate": [-0.05, 0.0]}})
         loop, program = self.play("cell", case, script), run_case(wanted, directory=self.here("cell as in the case"))
         state, history = program.results(), program.history()
         for name in ("bodies/position", "bodies/velocity", "cell/edge", "cell/velocity", "contacts/impulse"):
             np.testing.assert_array_equal(loop.results()["/steps/100/" + name], state["/steps/100/" + name], name)
-        strain_rate, length_x, length_y, tilt, rate, stress = map(float, loop.stdout.split()[-6:])
+        self.assertIn(", shear_stress_xy = -2.000E-01 N/m", program.stdout)
+        strain_rate, length_x, length_y, tilt, rate, stress, *strains = map(float, loop.stdout.split()[-9:])
         edge, velocity = (state[f"/steps/100/cell/{name}"] for name in ("edge", "velocity"))
         self.assertEqual([length_x, length_y, tilt], [edge[0, 0], edge[1, 1], edge[1, 0]])
         gradient = np.linalg.solve(edge, velocity).T
         np.testing.assert_allclose([strain_rate, rate], gradient[0], rtol=0, atol=1e-14)
-        self.assertEqual(stress, history["stress_yy"][-1])
+        self.assertEqual([stress, *strains], [history[name][-1] for name in ("stress_yy", "cell_strain_x", "cell_strain_y", "cell_shear_xy")])
 
     def test_bodies_of_a_cell_that_moves(self):
         """What is taken out of a cell, and velocities that are set, are counted once; the last body of a cell that stresses drive stays."""

@@ -225,7 +225,7 @@ check()
 with gravier.Simulation(case, quiet=True{options}) as s:
     try:
         {statement}
-    except gravier.SimulationError as error:
+    except (gravier.SimulationError, AttributeError) as error:
         assert {line!r} in str(error), str(error)
     else:
         raise AssertionError("not refused")
@@ -259,7 +259,8 @@ with gravier.Simulation(case, quiet=True{options}) as s:
                 ("far", "s.cell.pressure_y = 1e31", "cell: pressure_y is not a number to reckon with; expected a number of at most 1e30 in size"),
                 ("no number", "s.cell.pressure_y = 'much'", "cell: pressure_y: expected numbers"),
                 ("edge", "s.cell.length_x = 1.0", f"cell: length_x cannot be set; expected one of {names}"),
-                ("unknown", "s.cell.pressure_z", f"cell: pressure_z: unknown; expected one of {names}, length_x, length_y, tilt_xy"),
+                ("unknown", "s.cell.pressure_z", f"cell: pressure_z: unknown; expected one of {names}, length_x, strain_x, length_y, "
+                 "strain_y, tilt_xy, shear_xy"),
                 ("column", "s.real('stress_xx')", "real number 'stress_xx': unknown; gravier.h has the names, and options of &output add those of "
                                                   "their columns in history.csv")):
             self.refused("cell " + title, merged(free, cell), statement, line)

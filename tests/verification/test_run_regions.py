@@ -294,12 +294,7 @@ class Regions(RunTestCase):
                                     "time": {"steps": 20}, "output": {"every": 8, "checkpoint_every": 13}})
             each = self.play(f"each step {dimension}", merged(case, {"time": {"steps": 20}, "output": {"every": 1}}))
             runs = [self.play(f"sampled {dimension}", sampled), self.play(f"sampled on two {dimension}", sampled, ranks=2)]
-            here = self.here(f"killed {dimension}")
-            os.makedirs(here)
-            write(os.path.join(here, "case.nml"), namelist(sampled))
-            killed = subprocess.run([sys.executable, "-c", KILLED], cwd=here, env={**os.environ, "PYTHONPATH": os.path.join(SOURCE, "drivers/python")},
-                                    stderr=subprocess.PIPE, text=True, check=False)
-            self.assertEqual(killed.returncode, -signal.SIGKILL, killed.stderr)
+            here = self.killed(f"killed {dimension}", sampled)
             runs.append(gravier("--restart", "case.nml", ranks=1, directory=here))
             self.assert_status(runs[2], 0)
             for region in case["region"]:
@@ -313,6 +308,32 @@ class Regions(RunTestCase):
                     for other in runs[1:]:
                         for key, values in found.items():
                             np.testing.assert_array_equal(self.region(other, name, state)[key], values, f"{name} {state} {key}")
+
+    def killed(self, title, case):
+        """A run that is killed after step 15; its directory."""
+        here = self.here(title)
+        os.makedirs(here)
+        write(os.path.join(here, "case.nml"), namelist(case))
+        killed = subprocess.run([sys.executable, "-c", KILLED], cwd=here, env={**os.environ, "PYTHONPATH": os.path.join(SOURCE, "drivers/python")},
+                                stderr=subprocess.PIPE, text=True, check=False)
+        self.assertEqual(killed.returncode, -signal.SIGKILL, killed.stderr)
+        return here
+
+    def test_samples_of_another_question(self):
+        """A region whose name, sides, bins or sampling differ at a restart begins anew there; the others go on."""
+        case = self.stirred(2)
+        regions = [{**region, "sample_every": 1} for region in case["region"]]
+        plan = merged(case, {"time": {"steps": 20}, "output": {"every": 20, "checkpoint_every": 13}})
+        for title, asked, change, samples in (("same", "all", {}, 20), ("sides", "box", {"lower": [0.01, 0.02]}, 7),
+                                              ("bins", "bins", {"bins": 5}, 7), ("every", "box", {"sample_every": 2}, 4)):
+            here = self.killed(title, merged(plan, {"region": regions}))
+            changed = [{**region, **(change if region["name"] == asked else {})} for region in regions]
+            write(os.path.join(here, "case.nml"), namelist(merged(plan, {"region": changed})))
+            run = gravier("--restart", "case.nml", ranks=1, directory=here)
+            self.assert_status(run, 0)
+            for region in changed:
+                found = self.region(run, region["name"], 20).samples
+                self.assertEqual(list(found), [samples if region["name"] == asked else 20] * len(found), title)
 
     def compare_samples(self, found, one):
         """Means over steps against those of each step. The mass in a bin is told by its momentum alone, so that of equal grains its solid

@@ -151,7 +151,7 @@ class Run:
 
     def body(self, number):
         """A body, by its id, over the written states that have it, a row a state: step, time and the columns of `bodies`. In a periodic scene
-        position does not jump where the body crosses the cell."""
+        position does not jump where the body crosses the cell, and velocity does not where the cell is sheared or strained."""
         rows = []
         for step, time in zip(self.steps, self.times):
             bodies = self.bodies(step)
@@ -162,6 +162,8 @@ class Run:
             if "image" in one:
                 cell = self.cell(step)
                 one["position"] = one["position"] + one["image"] @ (np.diag(self.period) if cell is None else cell.edge)
+                if cell is not None:
+                    one["velocity"] = one["velocity"] + one["image"] @ cell.velocity
             rows.append(one)
         if not rows:
             raise ResultsError(f"{self.path}: no body {number} in the written states; expected an id of bodies()")

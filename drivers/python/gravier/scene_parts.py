@@ -4,7 +4,7 @@ import ctypes
 import numpy as np
 
 from .arrays import reals
-from .library import call, load
+from .library import SimulationError, call, load
 
 
 class Boundary:
@@ -57,19 +57,35 @@ class Boundaries:
 
 
 class Cell:
-    """The periodic cell of a scene where it moves or is sheared: `length_x`, `tilt_xy`, `strain_rate_x`, `shear_rate_xy`, `pressure_x`,
-    `shear_stress_xy` and the like, by name as attributes. Rates can be set, on all ranks alike, and so can stresses of components that
-    stresses drive in the case; they hold from the next step on. What is held is 0 where a rate moves a component."""
+    """The periodic cell of a scene where it moves or is sheared: `length_x`, `tilt_xy`, `strain_x`, `shear_xy`, `strain_rate_x`,
+    `shear_rate_xy`, `pressure_x`, `shear_stress_xy` and the like, by name as attributes. Rates can be set, on all ranks alike, and so can
+    stresses of components that stresses drive in the case; they hold from the next step on. What is held is 0 where a rate moves a
+    component."""
 
     def __init__(self, simulation):
         object.__setattr__(self, "_simulation", simulation)
+
+    def __dir__(self):
+        dimension = self._simulation.dimension
+        lines = [f"{name}_{axis}" for name in ("length", "strain", "strain_rate", "pressure") for axis in "xyz"[:dimension]]
+        planes = [f"{name}_{plane}" for name in ("tilt", "shear", "shear_rate", "shear_stress") for plane in ("xy", "xz", "yz")[:2 * dimension - 3]]
+        return [*object.__dir__(self), *lines, *planes]
 
     def __getattr__(self, what):
         if what.startswith("_"):
             raise AttributeError(what)
         value = ctypes.c_double()
-        call("get_cell", self._simulation.handle, what.encode(), ctypes.byref(value))
+        self._call("get_cell", what, ctypes.byref(value))
         return value.value
 
     def __setattr__(self, what, value):
-        call("set_cell", self._simulation.handle, what.encode(), float(reals(value, f"cell: {what}", ())))
+        self._call("set_cell", what, float(reals(value, f"cell: {what}", ())))
+
+    def _call(self, name, what, value):
+        """Call a procedure of the library; what a cell does not have is told as Python tells it of other objects."""
+        try:
+            call(name, self._simulation.handle, what.encode(), value)
+        except SimulationError as error:
+            if what in dir(self):
+                raise
+            raise AttributeError(str(error)) from None

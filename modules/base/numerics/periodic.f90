@@ -20,6 +20,8 @@ module gravier_periodic
     real(dp) :: shear(3) = 0.0_dp
     !> whether lengths or tilts change in this scene
     logical :: moves = .false.
+    !> whether a length would have come to 0 or below; it keeps its last value above 0
+    logical :: collapsed = .false.
   contains
     procedure :: on => period_on
     procedure :: wrap => period_wrap
@@ -243,7 +245,7 @@ contains
     rate(3) = g(2, 3)
   end subroutine find_shear_rate
 
-  !> Move the edges for a time at their rates, and count the shear.
+  !> Move the edges for a time at their rates, and count the shear. A cell that would collapse stays as it is, and says so.
   pure subroutine period_move(self, duration)
     class(period_t), intent(inout) :: self
     !> [s]
@@ -251,6 +253,8 @@ contains
     real(dp) :: rate(3)
 
     if (.not. self%moves) return
+    self%collapsed = self%collapsed .or. any(self%length > 0.0_dp .and. .not. self%length + duration*self%length_rate > 0.0_dp)
+    if (self%collapsed) return
     call find_shear_rate(self, rate)
     self%shear(:) = self%shear + duration*rate
     self%length(:) = self%length + duration*self%length_rate

@@ -1,13 +1,17 @@
 !> A region of means, a box with sides along the axes that may be cut into equal bins along one of them, and which parts of bodies
 !> and of branches of contacts lie in it.
 module gravier_mean_region
-  use gravier_kinds, only: dp, i4
+  use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: mean_region_t, region_grid_t, share_list_t, unbounded
+  public :: mean_region_t, region_grid_t, share_list_t, unbounded, region_name_length, region_words
 
   !> coordinate of a side that a region does not have [m]
   real(dp), parameter :: unbounded = 1.0e30_dp
+  !> characters of a name at most, of which a word of 8 bytes has so many
+  integer, parameter :: region_name_length = 64, word_characters = 8
+  !> words that say what is asked of a region: its name, its corners, axis, bins and sample_every
+  integer, parameter :: region_words = region_name_length/word_characters + 6 + 3
   !> what rounding may take of a period that a region spans
   real(dp), parameter :: nearly = 1.0e-9_dp
   !> parts of a branch in a box and its images: branches are shorter than half a period, so that there are two along an axis
@@ -26,6 +30,7 @@ module gravier_mean_region
     integer :: sample_every = 0
   contains
     procedure :: make_grid => mean_region_make_grid
+    procedure :: get_words => mean_region_get_words
   end type mean_region_t
 
   !> Which bins take how much of something.
@@ -58,6 +63,27 @@ module gravier_mean_region
   end type region_grid_t
 
 contains
+
+  !> What is asked of the region, bit by bit: two regions that differ in anything have other words.
+  pure subroutine mean_region_get_words(self, words)
+    class(mean_region_t), intent(in) :: self
+    integer(i8), intent(out) :: words(region_words)
+    character(len=region_name_length) :: name
+    integer :: k, at
+
+    name = self%name
+    at = region_name_length/word_characters
+    do k = 1, at
+      words(k) = transfer(name((k - 1)*word_characters + 1:k*word_characters), 0_i8)
+    end do
+    do k = 1, 3
+      words(at + k) = transfer(self%lower(k), 0_i8)
+      words(at + 3 + k) = transfer(self%upper(k), 0_i8)
+    end do
+    words(at + 7) = self%axis
+    words(at + 8) = self%bins
+    words(at + 9) = self%sample_every
+  end subroutine mean_region_get_words
 
   !> The space that the region takes in a scene: sides that it does not have are those of the scene.
   pure subroutine mean_region_make_grid(self, low, high, period, binned, grid)

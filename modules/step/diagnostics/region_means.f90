@@ -10,7 +10,7 @@ module gravier_region_means
   use gravier_physics, only: physics_t
   use gravier_contact_branch, only: find_branch
   use gravier_scene_extent, only: find_extent
-  use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t
+  use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t, region_words
   use gravier_region_samples, only: region_samples_t, region_figures_t, sum_rows, centres, volume, mass, energy, ends, holders, &
     & momentum
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
@@ -22,9 +22,7 @@ module gravier_region_means
   character(len=*), parameter :: regions_key = "region"
 
   !> what the state of the samples is: the version of checkpoints, which changes with it
-  character(len=*), parameter :: samples_record = "measured; bins axis sample_every, steps, a bin sums volume lower upper"
-  !> words of a region that are not those of region_samples_t
-  integer, parameter :: region_words = 3
+  character(len=*), parameter :: samples_record = "measured; what is asked, words, steps, a bin sums volume lower upper"
 
   type, extends(diagnostic_t) :: region_means_t
     type(mean_region_t), allocatable :: region(:)
@@ -158,39 +156,39 @@ contains
 
     n = 1
     do r = 1, size(self%region)
-      n = n + region_words + self%samples(r)%word_count()
+      n = n + region_words + 1 + self%samples(r)%word_count()
     end do
     allocate (words(n))
     words(1) = self%measured
     at = 1
     do r = 1, size(self%region)
-      words(at + 1) = self%region(r)%bins
-      words(at + 2) = self%region(r)%axis
-      words(at + 3) = self%region(r)%sample_every
-      at = at + region_words
       n = self%samples(r)%word_count()
+      call self%region(r)%get_words(words(at + 1:at + region_words))
+      at = at + region_words + 1
+      words(at) = n
       call self%samples(r)%get_state(words(at + 1:at + n))
       at = at + n
     end do
   end subroutine region_means_get_samples
 
-  !> Take samples that `get_samples` gave. Those of other bins, or of other steps, are left: such a region begins anew.
+  !> Take samples that `get_samples` gave. A region of which something else was asked begins anew.
   subroutine region_means_set_samples(self, words)
     class(region_means_t), intent(inout) :: self
     integer(i8), intent(in) :: words(:)
+    integer(i8) :: asked(region_words)
     integer :: r, at, n
 
     if (size(words) == 0) return
     self%measured = narrow(words(1))
     at = 1
-    do r = 1, size(self%region)
-      n = self%samples(r)%word_count()
-      if (at + region_words + n > size(words)) return
-      if (words(at + 1) /= self%region(r)%bins .or. words(at + 2) /= self%region(r)%axis .or. &
-        & words(at + 3) /= self%region(r)%sample_every) return
-      at = at + region_words
-      call self%samples(r)%set_state(words(at + 1:at + n))
-      at = at + n
+    do while (at + region_words < size(words))
+      n = narrow(words(at + region_words + 1))
+      do r = 1, size(self%region)
+        call self%region(r)%get_words(asked)
+        if (all(asked == words(at + 1:at + region_words)) .and. n == self%samples(r)%word_count()) &
+          & call self%samples(r)%set_state(words(at + region_words + 2:at + region_words + 1 + n))
+      end do
+      at = at + region_words + 1 + n
     end do
   end subroutine region_means_set_samples
 

@@ -12,8 +12,8 @@ module gravier_cell_drive
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: cell_drive_t, cell_components, cell_component, component_row, component_column, carry_grains, carry_bodies, &
-    & take_cell, check_cell_size
+  public :: cell_drive_t, cell_components, cell_component, component_row, component_column, stress_sign, carry_grains, &
+    & carry_bodies, take_cell, check_cell_size
 
   !> Components of the velocity gradient of a cell: three strains and the shears xy, xz and yz, by row and column.
   integer, parameter :: component_row(6) = [1, 2, 3, 1, 1, 2], component_column(6) = [1, 2, 3, 2, 3, 3]
@@ -50,8 +50,14 @@ contains
     component = merge(4, k, nd == 2 .and. k == 3)
   end function cell_component
 
-  !> Take the rates and stresses of a time from the table, where there is one. A shear stress drives the cell along itself: it is
-  !> held where the contacts resist with a negative component of the mean stress, in which compression is positive.
+  !> The component of the mean stress, in which compression is positive, that is held by a stress of the input: a pressure is that
+  !> component, and a shear stress drives the cell along itself, so that contacts resist with a component of the other sign.
+  pure real(dp) function stress_sign(row, column)
+    integer, intent(in) :: row, column
+    stress_sign = merge(1.0_dp, -1.0_dp, row == column)
+  end function stress_sign
+
+  !> Take the rates and stresses of a time from the table, where there is one.
   pure subroutine cell_drive_set_time(self, nd, time)
     class(cell_drive_t), intent(inout) :: self
     integer, intent(in) :: nd
@@ -64,7 +70,7 @@ contains
     do k = 1, n
       associate (a => component_row(cell_component(k, nd)), b => component_column(cell_component(k, nd)))
         if (self%table%has(k)) self%rate(a, b) = self%table%at(k, time)
-        if (self%table%has(n + k)) self%stress(a, b) = merge(1.0_dp, -1.0_dp, a == b)*self%table%at(n + k, time)
+        if (self%table%has(n + k)) self%stress(a, b) = stress_sign(a, b)*self%table%at(n + k, time)
       end associate
     end do
   end subroutine cell_drive_set_time
@@ -125,7 +131,7 @@ contains
     call period%set_gradient(problem%cell%now)
   end subroutine take_cell
 
-  !> Fail (status_failure) where a cell has shrunk so far that pairs would meet across both sides of it.
+  !> Fail (status_failure) where a cell has collapsed, or has shrunk so far that pairs would meet across both sides of it.
   subroutine check_cell_size(decomposition, step, error)
     type(decomposition_t), intent(in) :: decomposition
     !> number of the step, for the message
@@ -133,6 +139,11 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     real(dp) :: least, shortest
 
+    if (decomposition%period%collapsed) then
+      call raise(error, status_failure, "step "//to_text(step)//": the periodic cell shrinks by more than its length in this "// &
+        & "step; expected rates of strain, pressures and a &time step that shrink it little in a step")
+      return
+    end if
     least = 2.0_dp*(2.0_dp*decomposition%rule%largest_radius + decomposition%rule%range())
     associate (length => decomposition%period%length)
       shortest = minval(length, mask=length > 0.0_dp)
