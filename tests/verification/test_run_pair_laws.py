@@ -261,6 +261,26 @@ class Bridges(SmallScene):
                     self.assertLessEqual(-impulse / self.step, force + 1e-9, number)
         self.assertEqual(len(seen), 4, seen)
 
+    def test_bridges_at_the_start(self):
+        """Pairs that do not touch have bridges at the start of a run up to a distance, and grains that come as near later have none."""
+        capillarity, decay, gaps = 2.0, 0.003, (0.001, 0.003, 0.0042)
+        grains = [Grain((x, 2 * RADIUS * y + gap * (y > 0))) for x, gap in zip((0.0, 1.0, 2.0), gaps) for y in (0, 1)]
+        grains.append(Grain((0.5, 0.02 + 2 * RADIUS), velocity=(0.0, -0.5)))
+        grains.append(Grain((0.5, 0.0)))
+        for near in (0.0, 0.004):
+            bridge = law("a", "capillary", capillarity=capillarity, decay_length=decay, debonding_distance=0.005,
+                         **({"bridge_distance": near} if near else {}))
+            record = self.play(f"bridges at the start {near}", grains, [], steps=17, material=named("a"), law=[bridge])
+            contacts = record.contacts[1]
+            found = {(first, second): -impulse / self.step for first, second, impulse in
+                     zip(contacts["candidate"], contacts["antagonist"], contacts["impulse"][:, 0])}
+            for k, gap in enumerate(gaps):
+                force = capillarity * RADIUS * np.exp(-gap / decay) if gap <= near else 0.0
+                pull = found.get((2 * k + 2, 2 * k + 1), found.get((2 * k + 1, 2 * k + 2), 0.0))
+                self.verify("bridges at the start", f"force at a gap of {gap} m", pull, force, 1e-9)
+            self.assertLess(record.position[-1, 6, 1] - record.position[-1, 7, 1] - 2 * RADIUS, 0.004)
+            np.testing.assert_array_equal(record.velocity[-1, 6], [0.0, -0.5])
+
 
 class Bonds(SmallScene):
 
