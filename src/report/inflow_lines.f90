@@ -2,7 +2,7 @@
 module gravier_inflow_lines
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
-  use gravier_insertion, only: insertion_t, most_a_step
+  use gravier_insertion, only: insertion_t, new_grain_t, most_a_step
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -14,12 +14,13 @@ module gravier_inflow_lines
 
 contains
 
-  !> Warnings, each a line ended by a newline, and their number: rates at which grains enter faster than they leave the region, or
-  !> of more grains than may enter in a step.
+  !> Warnings, each a line ended by a newline, and their number: masses below that of the first grain, rates at which grains enter
+  !> faster than they leave the region, or of more grains than may enter in a step.
   subroutine inflow_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text
     integer, intent(out) :: number
+    type(new_grain_t) :: grain
     real(dp) :: rate, stay, most
     integer :: i
 
@@ -27,6 +28,13 @@ contains
     number = 0
     do i = 1, size(simulation%inflow%insertions)
       associate (insertion => simulation%inflow%insertions(i))
+        if (insertion%entered == 0 .and. insertion%most_grains > 0 .and. insertion%is_complete()) then
+          number = number + 1
+          grain = insertion%grain(1_i8)
+          text = text//"warning     &insertion '"//insertion%name//"': no grain enters, since the first one has a mass of "// &
+            & to_text(grain%mass, 3)//" kg: a mass above that lets grains in"//newline
+          cycle
+        end if
         rate = insertion%rate
         if (insertion%mass_rate < huge(1.0_dp)) rate = insertion%mass_rate/insertion%mean_mass()
         if (.not. rate < huge(1.0_dp)) cycle
@@ -92,7 +100,7 @@ contains
         number = insertion%planned(simulation%config%time%steps*simulation%physics%h)
         if (number < huge(1.0_dp)) then
           text = text//"  insertion '"//insertion%name//"': about "//to_text(nint(min(number, 1.0e18_dp), i8))// &
-            & " grains enter until the end, and take at least "//to_text(int(min(number*bytes/1024.0_dp, 1.0e18_dp), i8) + 1)// &
+            & " grains enter until the end, taking at least "//to_text(int(min(number*bytes/1024.0_dp, 1.0e18_dp), i8) + 1)// &
             & " KiB more of all ranks"//newline
         else
           text = text//"  insertion '"//insertion%name//"': as many grains enter as find places; each takes at least "// &

@@ -463,6 +463,7 @@ contains
     call write_lines(self, population_lines(simulation), "", error)
     call write_lines(self, cell_strain_lines(simulation), "", error)
     warnings = self%progress%warnings()
+    if (warnings /= "" .and. simulation%restarted) warnings = warnings//"; those since the restart"
     if (warnings /= "") call self%line("warnings    "//warnings, error)
     call write_lines(self, summary_lines(self%comm, simulation, phases, seconds), "", error)
   end subroutine run_log_write_end

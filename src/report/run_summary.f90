@@ -169,10 +169,14 @@ contains
       else if (is_doubtful(simulation)) then
         text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
           & to_text(simulation%config%solver%tolerance, 2)//", but "//doubts_text(simulation)
+      else if (simulation%step == 0) then
+        text = "no step was made"
       else if (simulation%restarted .and. tally%steps == 0) then
         text = "no step was left to make after step "//to_text(simulation%step)
       else
-        text = "all "//to_text(simulation%step)//" steps reached the "//goal_name(simulation)
+        text = "all "//to_text(simulation%step)//" steps"
+        if (simulation%step == 1) text = "its only step"
+        text = text//" reached the "//goal_name(simulation)
         if (goal_name(simulation) /= "accuracy") text = text//" and the accuracy"
       end if
       if (tally%worst_error > far_off .and. .not. (simulation%failed == 0 .and. is_doubtful(simulation))) text = text// &

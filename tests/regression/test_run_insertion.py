@@ -204,6 +204,14 @@ class Insertion(RunTestCase):
         self.assert_status(limited, 0)
         total = limited.history()["entered_mass"].sum()
         self.assertTrue(3.0 - 2000.0 * np.pi * 0.006 ** 2 < total <= 3.0, total)
+        # below the mass of one grain
+        none = run_case(merged(changed(mass=0.1), {"time": {"steps": 2}}), directory=self.here("none"))
+        self.assert_status(none, 0)
+        self.assertEqual(none.history()["entered"].sum(), 0)
+        self.assertRegex(none.stdout, r"\nwarning     &insertion 'feed': no grain enters, since the first one has a mass of [12]\.\d\dE-01 kg: a mass above "
+                                      r"that lets grains in\n")
+        checked = run_case(changed(mass=0.1), directory=self.here("none checked"), options=["--check"])
+        self.assertIn("insertion 'feed': about 0 grains enter until the end, taking at least", checked.stdout)
         for each in (run, limited):
             self.assertIn("all that its bounds allow", each.stdout)
             self.assertNotIn("fewer than its rate owes", each.stdout)

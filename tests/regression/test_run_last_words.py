@@ -128,6 +128,9 @@ class LastWords(RunTestCase):
         run = run_case(merged(PAIR, {"time": {"steps": 20}}), 1, self.here("seldom"))
         self.assertIn("projected in 1 of 20 steps (5 %)", run.stdout)
         self.assertEqual(line(run, "finished"), "finished    all 20 steps reached the accuracy; results in results")
+        for steps, words in ((0, "no step was made"), (1, "its only step reached the accuracy")):
+            few = run_case(merged(self.rest, {"time": {"steps": steps}, "output": {"every": 1}}), 1, self.here(f"of {steps}"))
+            self.assertEqual(line(few, "finished"), f"finished    {words}; results in results")
         off = run_case(merged(PAIR, {"scene": {"overlap_projection": False, "overlap_allowed": None}}), 1, self.here("off"))
         self.assertIn("            overlaps are not projected\n", off.stdout)
 

@@ -145,6 +145,10 @@ class Progress(RunTestCase):
         said = [int(number) for number in re.findall(r"NOT CONVERGED: .* in step (\d+)", run.stdout)]
         self.assertEqual(said, [1, 2, 3, 4, 5, 10, 20])
         self.assertIn("\nwarnings    solves above the tolerance 30\n", run.stdout)
+        limited = {"solver": {"tolerance": 1e-9, "max_iterations": 2}, "output": {"every": 0, "checkpoint_every": 10}}
+        for steps, options in ((10, []), (12, ["--restart"])):
+            run = run_case(merged(self.case, limited, {"time": {"steps": steps}}), 1, self.here("restarted"), options=options)
+        self.assertIn("\nwarnings    solves above the tolerance 2; those since the restart\n", run.stdout)
 
     def test_summary(self):
         """Whether it converged, where the time went, what would halve it: as the history has it."""

@@ -292,7 +292,8 @@ contains
 
     duration = max(min(time, self%end) - self%start, 0.0_dp)
     number = huge(1.0_dp)
-    if (self%most_grains < huge(1_i8)) number = real(self%most_grains, dp)
+    if (self%is_complete()) number = real(self%entered, dp)
+    if (self%most_grains < huge(1_i8)) number = min(number, real(self%most_grains, dp))
     if (self%most_mass < huge(1.0_dp)) number = min(number, self%most_mass/self%mean_mass())
     if (self%rate < huge(1.0_dp)) number = min(number, self%rate*duration)
     if (self%mass_rate < huge(1.0_dp)) number = min(number, self%mass_rate*duration/self%mean_mass())
