@@ -12,6 +12,8 @@ from picture_style import PictureError, scaled
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
 STYLES = ["-", "--", ":", "-."]
+#: of the components of a profile, which are five at most
+PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass", "kg"),
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s")]
@@ -287,7 +289,7 @@ def draw_column(axes, run, tables, column, axis, shades):
         for c, (key, values) in enumerate(row.items()):
             colour = LINES[c % len(LINES)] if shades is None else shades[k]
             x, y = (values, centre) if upright else (centre, values)
-            axes.plot(x, y, STYLES[c % len(STYLES)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
+            axes.plot(x, y, linestyle=PARTS[c % len(PARTS)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
     shown = numpy.concatenate([values for row in rows for values in row.values()])
     unit = "N/m" if run.dimension == 2 else "Pa"
     label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)

@@ -138,7 +138,7 @@ def draw_space(axes, view, walls, low, high):
     for points in walls.polygons():
         draw_wall(axes, view, points, numpy.dot(points.mean(axis=0) - middle, view.eye) > 0.0)
     for point, normal in zip(*walls.planes()):
-        if numpy.abs(normal).max() < ALONG:
+        if not is_face(point, normal, low, high):
             points = cut_box(point, normal, low, high)
             if len(points) >= 3:
                 draw_wall(axes, view, points, numpy.dot(normal, view.eye) < 0.0)
@@ -146,6 +146,12 @@ def draw_space(axes, view, walls, low, high):
         draw_cylinder(axes, view, (point, axis, radius), low, high)
     if len(walls.facets) > 0:
         axes.add_collection(PolyCollection(view.place(walls.facets), facecolors="none", edgecolors="0.6", linewidths=0.3, zorder=0.5))
+
+
+def is_face(point, normal, low, high):
+    """Whether a plane is a face of the box, or nearly so, with the box on its free side."""
+    a = numpy.argmax(numpy.abs(normal))
+    return abs(normal[a]) > ALONG and abs(point[a] - (low if normal[a] > 0.0 else high)[a]) < 0.02 * numpy.max(high - low)
 
 
 def draw_wall(axes, view, points, before):
@@ -193,13 +199,13 @@ def draw_cylinder(axes, view, cylinder, low, high):
 
 def draw_box(axes, view, walls, low, high):
     """The three faces of a box that are behind the bodies, grey where a plane is there, and axes with numbers on its outline."""
-    places, normals = walls.planes()
     ends, size = (low, high), numpy.max(high - low)
+    faces = [normal for point, normal in zip(*walls.planes()) if is_face(point, normal, low, high)]
     for a in range(3):
         side = int(view.eye[a] < 0.0)
         corners = box_corners(low, high)
         face = corners[numpy.isclose(corners[:, a], ends[side][a], atol=1e-9 * size)][[0, 1, 3, 2]]
-        wall = numpy.any((normals[:, a] * (1 - 2 * side) > ALONG) & (numpy.abs(places[:, a] - ends[side][a]) < 0.02 * size))
+        wall = any(normal[a] * (1 - 2 * side) > ALONG for normal in faces)
         axes.add_patch(plt.Polygon(view.place(face), closed=True, facecolor="0.94" if wall else "none", edgecolor="0.6", linewidth=0.6, zorder=0.2))
     numbered = []
     for a in range(3):

@@ -1,5 +1,6 @@
 """Command lines whose errors are one line, as those of the programs, and tools that end in an orderly way."""
 import argparse
+import math
 import signal
 import sys
 import unicodedata
@@ -15,6 +16,30 @@ class OneLineParser(argparse.ArgumentParser):
 
     def error(self, message):
         self.exit(2, f"{self.prog.split()[0]}: error: {' '.join(message.split())}; see {self.prog} --help\n")
+
+
+def whole(least):
+    """The type of an option that is an integer of at least so much."""
+    def read(text):
+        try:
+            number = int(text)
+        except ValueError:
+            number = least - 1
+        if number < least:
+            raise argparse.ArgumentTypeError(f"'{plain(text)}': expected an integer >= {least}")
+        return number
+    return read
+
+
+def positive(text):
+    """The type of an option that is a number above 0."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = 0.0
+    if not 0.0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected a number > 0")
+    return number
 
 
 def run_tool(main):

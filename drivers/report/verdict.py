@@ -4,7 +4,7 @@ import re
 import numpy
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
-#: as the last words of the program judge: the fraction of steps with mended overlaps, the part of the paths of grains below which
+#: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
 #: shifts are small, the velocity error over U
 OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
 #: the question whose answer says nothing of the run
@@ -82,10 +82,10 @@ def accurate(log, history, solver):
     return Answer(question, grade, f"The criterion '{solver.get('criterion')}' does not bound it; as estimated, {words}.")
 
 
-def mended(log, history):
+def projected(log, history):
     """As the log counts projections at its end, which leaves out those that shift by rounding, and weighs them by the paths of grains; of
     steps that it does not know, before its end or before a restart, as history.csv counts them."""
-    question = "Was the geometry mended?"
+    question = "Were overlaps projected?"
     recorded = "projected" in history and "max_overlap" in history and len(history) > 0
     if not recorded and not log.value("overlaps"):
         return Answer(question, UNKNOWN, "Not known: no step is recorded.")
@@ -160,7 +160,7 @@ def answers(log, history, options, notes):
     """Answers to all questions of a run; `notes` name files that are missing or damaged."""
     solver = (options.get("solver") or [{}])[0]
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(log, history, solver), mended(log, history), *too_fast(history), *balanced(log),
+    return [ended(log, history, steps), converged(log, history), accurate(log, history, solver), projected(log, history), *too_fast(history), *balanced(log),
             *readable(notes)]
 
 

@@ -7,13 +7,12 @@ smooth walls, then compression at constant lateral pressure with friction 0.5.
 leaves in DIR study_biaxial.csv (the stress-strain curve), study_biaxial_summary.csv and study_biaxial.png. --quick takes 600 disks.
 The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import (draw_disks, loose, plt, radii_by_volume, read_bodies, read_history, run, sized, states, write_csv,
-                           write_hdf5)
+from study_support import (OneLineParser, claimed, draw_disks, loose, plt, positive, radii_by_volume, read_bodies,
+                           read_history, run, run_study, sized, states, whole, write_csv, write_hdf5)
 from whole_file import save_figure
 
 PRESSURE = 1000.0  # N/m
@@ -174,21 +173,21 @@ def accepted(summary, n):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/biaxial"), help="default: out/biaxial")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK['grains']} disks")
-    parser.add_argument("--grains", type=int, help=f"disks ({FULL['grains']}, quick {QUICK['grains']})")
-    parser.add_argument("--seed", type=int, default=2012, help="of the radii and places at the start (2012)")
-    parser.add_argument("--compaction-steps", type=int, default=1500)
+    parser.add_argument("--grains", type=whole(1), help=f"disks ({FULL['grains']}, quick {QUICK['grains']})")
+    parser.add_argument("--seed", type=whole(0), default=2012, help="of the radii and places at the start (2012)")
+    parser.add_argument("--compaction-steps", type=whole(0), default=1500)
     parser.add_argument("--compacted", action="store_true", help="start from the disks that an earlier run left in DIR/rest")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
-    parser.add_argument("--rate", type=float, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
-    parser.add_argument("--tolerance", type=float, default=3.0e-5, help="of the solves while the lid comes down")
-    parser.add_argument("--max-iterations", type=int, default=1000)
+    parser.add_argument("--rate", type=positive, default=0.01, help="vertical strain rate, relative to the first height [1/s]")
+    parser.add_argument("--tolerance", type=positive, default=3.0e-5, help="of the solves while the lid comes down")
+    parser.add_argument("--max-iterations", type=whole(1), default=1000)
     parser.add_argument("--acceleration", choices=["none", "momentum"], default="momentum", help="of the same solves")
-    parser.add_argument("--strain", type=float, default=0.15, help="vertical strain at the end")
+    parser.add_argument("--strain", type=positive, default=0.15, help="vertical strain at the end")
     options = sized(parser.parse_args(), FULL, QUICK)
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     n = options.grains
     rng = np.random.default_rng(options.seed)
     radii = radii_by_volume(n, SMALLEST, 3.0 * SMALLEST, 2, rng)
@@ -261,4 +260,4 @@ def draw(out, strain, sine, fraction, start, radii):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

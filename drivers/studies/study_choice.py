@@ -14,7 +14,6 @@ processor seconds of a run on one rank. Cost is seconds over those of the cheape
 default accuracy and of the tight one beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
 import resource
-import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +21,8 @@ from types import SimpleNamespace
 import numpy as np
 from oracle_table import Bounds
 from study_drum import surface_angle
-from study_support import BINARIES, SOURCE, gravier, read_history, sized, states, write_hdf5, write_measured
+from study_support import (BINARIES, SOURCE, OneLineParser, claimed, gravier, read_history,
+                           run_study, sized, states, whole, write_hdf5, write_measured)
 
 ACCURACIES = (0.3, 0.1, 0.03)
 #: deviation that counts as none: of a change of volume, which is a small difference, and of all else
@@ -213,17 +213,17 @@ def accepted(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/choice"), help="default: out/choice")
     parser.add_argument("--quick", action="store_true", help="settling and biaxial alone, without the smallest step")
     parser.add_argument("--only", nargs="+", choices=list(SCENES), metavar="SCENE", help="scenes to run")
-    parser.add_argument("--realisations", type=int, help="runs of each setting, 2 or more (8; 4 with --quick)")
-    parser.add_argument("--jobs", type=int, default=2, help="runs at the same time")
+    parser.add_argument("--realisations", type=whole(2), help="runs of each setting, 2 or more (8; 4 with --quick)")
+    parser.add_argument("--jobs", type=whole(1), default=2, help="runs at the same time")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = sized(parser.parse_args(), {"only": list(SCENES), "realisations": 8}, {"only": ["settling", "biaxial"], "realisations": 4})
     if options.realisations < 2:
         parser.error(f"--realisations {options.realisations}: expected 2 or more")
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     if options.quick:
         for scene in SCENES.values():
             scene.steps = scene.steps[:2]
@@ -236,4 +236,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

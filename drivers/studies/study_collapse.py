@@ -10,13 +10,12 @@ leaves in DIR study_collapse.csv, study_collapse_summary.csv and study_collapse.
 columns of fewer grains, which in 3D are too few for a slope of tall columns. The closing table has each measured quantity beside
 what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import draw_disks, lattice, plt, read_bodies, run, states, write_csv, write_hdf5
+from study_support import OneLineParser, claimed, draw_disks, lattice, plt, read_bodies, run, run_study, states, whole, write_csv, write_hdf5
 from whole_file import save_figure
 
 STEP = 5.0e-4  # s
@@ -148,13 +147,14 @@ def accepted(dimension, columns, chosen, slopes):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/collapse"), help="default: out/collapse")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
     parser.add_argument("--quick", action="store_true", help="fewer columns of fewer grains")
-    parser.add_argument("--grains", type=int, help="in each column: 1000 disks or 6000 spheres, about")
+    parser.add_argument("--grains", type=whole(1), help="in each column: 1000 disks or 6000 spheres, about")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
+    claimed(options.out)
     case, make = {2: (PLANE, column_2d), 3: (SPACE, column_3d)}[options.dimension]
     if options.quick:
         case = SimpleNamespace(**{**vars(case), **QUICK[options.dimension]})
@@ -210,4 +210,4 @@ def draw(path, ratio, run_out, slopes, heaps):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What the subdomains of a packing exchange, against grains a subdomain, and what 1e9 grains on 1e5 cores would.
+"""What the subdomains of a packing exchange, by grains a subdomain, and an estimate for 1e9 grains on 1e5 cores.
 
     ./gravier study communication BODIES.h5 [--out DIR] [--gravier PROGRAM] [--subdomains 2,4,...]
     ./gravier study communication --quick [--out DIR]        a lattice of 32 768 spheres in the place of BODIES.h5
@@ -21,7 +21,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 from oracle_table import Bounds
-from study_support import BINARIES, plt, write_hdf5
+from study_support import BINARIES, OneLineParser, claimed, plt, run_study, write_hdf5
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
 from gravier.case import value_text  # noqa: E402
@@ -64,7 +64,7 @@ BELOW = 1.0 / 6.0
 
 
 def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bodies", nargs="?", help="bodies file of a dense packing; not with --quick")
     parser.add_argument("--out", default="out/communication", help="directory of the results; default: out/communication")
     parser.add_argument("--quick", action="store_true", help="a lattice in the place of the bodies file, and fewer subdomains")
@@ -73,6 +73,8 @@ def arguments():
     options = parser.parse_args()
     if (options.bodies is None) != options.quick:
         parser.error("expected either a bodies file of a dense packing or --quick")
+    if options.bodies and not os.path.isfile(options.bodies):
+        parser.error(f"{options.bodies}: no such file; expected a bodies file of a dense packing")
     options.subdomains = options.subdomains or (QUICK if options.quick else FULL)["subdomains"]
     return options
 
@@ -207,7 +209,7 @@ def accepted(options, table, slopes, grains, dimension):
 
 def main():
     options = arguments()
-    os.makedirs(options.out, exist_ok=True)
+    claimed(options.out)
     bodies = os.path.abspath(options.bodies or os.path.join(options.out, "lattice.h5"))
     if options.quick:
         centres = lattice_of_spheres()
@@ -220,4 +222,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -18,13 +18,12 @@ each measured quantity beside what is accepted. Exit status: 0 all are held; 1 o
 import argparse
 import csv
 import re
-import sys
 from pathlib import Path
 
 from bounds_of_convergence import BOUNDS
 from oracle_table import Bounds
 from study_error import measure
-from study_support import SOURCE, gravier, read_history, run, sized, write_measured
+from study_support import SOURCE, OneLineParser, claimed, gravier, read_history, run, run_study, sized, write_measured
 
 PARTS = ("momentum", "heights", "subdomains", "methods", "warm", "newton")
 LONG_PARTS = ("large",)
@@ -305,7 +304,7 @@ def show(rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/convergence"))
     parser.add_argument("--quick", action="store_true", help="smaller scenes")
     parser.add_argument("--parts", metavar="LIST", help=f"some of {','.join(PARTS + LONG_PARTS)}")
@@ -314,11 +313,10 @@ def main():
     if options.quick:
         globals().update(QUICK)
     table = Bounds()
-    out = options.out.resolve()
-    out.mkdir(parents=True, exist_ok=True)
+    if not set(options.parts.split(",")) <= set(PARTS + LONG_PARTS):
+        parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS + LONG_PARTS)}")
+    out = claimed(options.out).resolve()
     for part in options.parts.split(","):
-        if part not in PARTS + LONG_PARTS:
-            parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS + LONG_PARTS)}")
         more = {"bodies": options.bodies.resolve()} if part in LONG_PARTS and options.bodies else {}
         rows = globals()[f"study_{part}"](out, **more)
         names = list(dict.fromkeys(key for row in rows for key in row))
@@ -328,4 +326,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -16,16 +16,14 @@ import os
 import platform
 import shutil
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 from dem_codes import Log, lammps_version, run_gravier, run_lammps
 from dem_scenes import Discharge, Settling, Shear
 from oracle_table import Table, say
-from study_support import BINARIES, ENVIRONMENT, SOURCE, write_measured
+from study_support import BINARIES, ENVIRONMENT, SOURCE, OneLineParser, claimed, run_study, whole, write_measured
 
-from one_line import OneLineParser
 
 STORED = SOURCE / "data/studies/dem.csv"
 PARTS = ("settling", "shear", "discharge")
@@ -200,7 +198,7 @@ def main():
     parser.add_argument("--quick", action="store_true", help="smaller scenes, one setting of each")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="processes (all)")
     parser.add_argument("--lammps", metavar="PROGRAM", help="LAMMPS (lmp of PATH); none: stored figures")
-    parser.add_argument("--seed", type=int, default=1, help="of the radii and places at the start (1)")
+    parser.add_argument("--seed", type=whole(0), default=1, help="of the radii and places at the start (1)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="directory of the tables and the runs")
     parser.add_argument("--record", action="store_true", help=f"write what LAMMPS finds into {STORED.name}")
     options = parser.parse_args()
@@ -209,7 +207,7 @@ def main():
         parser.error("--record: expected LAMMPS on this machine")
     lammps = Lammps(program, "small" if options.quick else "full")
     with tempfile.TemporaryDirectory() as passing:
-        place = (options.out or Path(passing)).resolve()
+        place = (claimed(options.out) if options.out else Path(passing)).resolve()
         study = Study(lammps, options.quick)
         settling = Settling(place, options.quick, options.seed)
         processes = {"settling": settling, "shear": Shear(place, options.quick, options.seed),
@@ -244,4 +242,4 @@ def fill(settling, lammps):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Overlaps in long runs, with and without the projection of places: disks and spheres at rest in a box under gravity at loose
+"""Overlaps in long runs, with and without their projection: disks and spheres at rest in a box under gravity at loose
 tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of their radius, disks under a piston.
 
     ./gravier study drift [--out DIR] [--quick] [--gravier PROGRAM] [--steps 20000]     3 minutes on one core
@@ -7,12 +7,12 @@ tolerances, disks in a slow drum, disks that begin with overlaps of a fifth of t
 leaves DIR/drift.csv (a row a run), DIR/drift_curves.csv (overlaps against time) and DIR/drift.png. --quick makes a tenth of the
 steps. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import BINARIES, lattice, plt, read_bodies, read_history, run, sized, states, write_csv, write_hdf5
+from study_support import (BINARIES, OneLineParser, claimed, lattice, plt, read_bodies, read_history,
+                           run, run_study, sized, whole, write_csv, write_hdf5)
 from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.008, 0.012  # m
@@ -150,12 +150,13 @@ def accepted(rows, curves):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/drift"), help="default: out/drift")
     parser.add_argument("--gravier", metavar="PROGRAM", type=Path, default=BINARIES / "gravier")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK['steps']} steps")
-    parser.add_argument("--steps", type=int, help=f"of the longest runs ({FULL['steps']}, quick {QUICK['steps']})")
+    parser.add_argument("--steps", type=whole(1), help=f"of the longest runs ({FULL['steps']}, quick {QUICK['steps']})")
     options = sized(parser.parse_args(), FULL, QUICK)
+    claimed(options.out)
     rng = np.random.default_rng(19)
     cell = 2.05 * LARGEST
     flat, cube, mouth = [20.1 * cell, 20.1 * cell], [7.1 * cell, 7.1 * cell, 8.1 * cell], [DRUM, DRUM]
@@ -232,4 +233,4 @@ def draw(path, curves):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -6,12 +6,11 @@
 leaves in DIR study_drum.csv, study_drum_summary.csv and study_drum.png. --quick takes a shorter time. The closing table has each
 measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import SOURCE, draw_disks, error_of, plt, read_history, run, states, write_csv
+from study_support import SOURCE, OneLineParser, claimed, draw_disks, error_of, plt, read_history, run, run_study, states, write_csv
 from whole_file import save_figure
 
 RADIUS, RATE = 0.2, 1.0  # m, rad/s
@@ -50,10 +49,11 @@ def accepted(history, angles, moments):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/drum"), help="default: out/drum")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} steps in the place of {FULL}")
     options = parser.parse_args()
+    claimed(options.out)
     run(options.out / "drum", {
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": DENSITY,
                   "friction": 0.5, "alert_distance": 1.5e-3},
@@ -92,4 +92,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

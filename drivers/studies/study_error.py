@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Whether the estimate by which solves end is true: the estimated velocity error of unfinished solves beside the true one.
+"""The estimated velocity error, by which solves end, beside the true one: unfinished solves of many scenes, and whole runs.
 
     ./gravier study error --quick               small scenes: a minute on two cores
     ./gravier study error                       all: about 15 minutes on two cores
@@ -27,7 +27,7 @@ import numpy as np
 from error_cost import HEIGHTS, study_cost
 from error_rest import study_rest
 from error_strength import study_strength
-from study_support import BINARIES, ENVIRONMENT, gravier, run, write_hdf5, write_measured
+from study_support import BINARIES, ENVIRONMENT, OneLineParser, claimed, gravier, run, run_study, write_hdf5, write_measured
 from whole_file import whole_file
 
 PARTS = ("estimate", "rest", "cost", "strength")
@@ -472,7 +472,7 @@ def at_rest(quick):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/error"))
     parser.add_argument("--quick", action="store_true", help="small scenes, few steps, no long runs")
     parser.add_argument("--parts", metavar="LIST", default="", help=f"some of {','.join(PARTS)}; with --quick the first two, else all")
@@ -482,8 +482,7 @@ def main():
     parts = options.parts.split(",") if options.parts else PARTS[:2] if options.quick else PARTS
     if not set(parts) <= set(PARTS):
         parser.error(f"--parts {options.parts}: expected some of {','.join(PARTS)}")
-    out = options.out.resolve()
-    out.mkdir(parents=True, exist_ok=True)
+    out = claimed(options.out).resolve()
     started = time.time()
     failures = []
     if "estimate" in parts:
@@ -501,4 +500,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

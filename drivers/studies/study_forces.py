@@ -15,9 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from oracle_table import Table
-from study_support import SOURCE, plt, run, states, write_csv
+from study_support import SOURCE, OneLineParser, claimed, plt, run, run_study, states, write_csv
 
-from one_line import OneLineParser
 from whole_file import save_figure
 
 #: exponents of the publication
@@ -90,7 +89,7 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/forces"), help="default: out/forces")
     parser.add_argument("--quick", action="store_true", help="half of the strain")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     table, found, values = Table(), {}, {}
     for name in ("rigid", "springs"):
         found[name] = compress(options.out / name, name == "springs", 2000 if options.quick else 4000)
@@ -107,4 +106,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The hard cases of tests/hard by every method, on 1 and 2 ranks: what converges, in how many iterations, and what does not.
+"""Small scenes that are hard to solve, by every method, on 1 and 2 ranks: what converges, in how many iterations, and what does not.
 
     ./gravier study hard [--out DIR] [--cases REGEX] [--methods TITLE...] [--ranks 1 2] [--several METHOD] [--short]
     ./gravier study hard --quick [--out DIR]
@@ -20,7 +20,7 @@ sys.path[:0] = [str(SOURCE / "tests" / "hard"), str(SOURCE / "tests" / "support"
 import gravier_runs  # noqa: E402
 from hard_cases import cases, disagreement, methods_of, play  # noqa: E402
 from oracle_table import Bounds  # noqa: E402
-from study_support import emptied, sized  # noqa: E402
+from study_support import OneLineParser, claimed, emptied, run_study, sized, whole  # noqa: E402
 from whole_file import whole_file  # noqa: E402
 
 COLUMNS = ["case", "method", "ranks", "subdomains", "steps", "iterations", "residual", "energy_change", "overlap", "status", "wrong"]
@@ -136,19 +136,22 @@ def accepted(options, rows):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/hard"), help="default: out/hard")
     parser.add_argument("--quick", action="store_true", help="three methods on one rank, short cases")
     parser.add_argument("--cases", default="", help="names of cases that match")
     parser.add_argument("--methods", nargs="+", help="titles of the methods; all")
-    parser.add_argument("--ranks", type=int, nargs="+", help="numbers of ranks; 1 2")
+    parser.add_argument("--ranks", type=whole(1), nargs="+", help="numbers of ranks; 1 2")
     parser.add_argument("--several", nargs="+", help="titles of the methods that run on more than the first of the ranks; all")
     parser.add_argument("--short", action="store_true", help="no long runs")
-    parser.add_argument("--workers", type=int, default=2, help="cases side by side")
+    parser.add_argument("--workers", type=whole(1), default=2, help="cases side by side")
     options = sized(parser.parse_args(), FULL, QUICK)
     options.short = options.short or options.quick
     options.broken, options.apart = [], []
-    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        re.compile(options.cases)
+    except re.error as error:
+        parser.error(f"--cases {options.cases}: expected a regular expression: {error}")
     chosen = [case for name, case in cases().items() if re.search(options.cases, name) and not (options.quick and case.slow)]
     if not chosen:
         parser.error(f"--cases {options.cases}: no case has a name that matches")
@@ -156,6 +159,7 @@ def main():
     unknown = [title for title in options.methods or [] if title not in titles]
     if unknown:
         parser.error(f"--methods {unknown[0]}: expected one of {'; '.join(sorted(titles))}")
+    claimed(options.out)
     found = gravier_runs.each(study, [(options, case) for case in chosen], options.workers)
     made = [r for several in found for r in several]
     rows = joined(options.out / "hard_cases.csv", made)
@@ -173,4 +177,4 @@ def main():
 MARK = "<!-- what follows is written by drivers/studies/study_hard.py -->"
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

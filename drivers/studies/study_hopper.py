@@ -9,13 +9,13 @@ leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, o
 and a shorter time. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is
 missed."""
 import argparse
-import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import draw_disks, lattice, plt, read_bodies, read_history, run, states, write_csv, write_hdf5
+from study_support import (OneLineParser, claimed, draw_disks, lattice, plt, positive, read_bodies,
+                           read_history, run, run_study, states, write_csv, write_hdf5)
 from whole_file import save_figure
 
 STEP = 5.0e-4  # s
@@ -99,11 +99,11 @@ def bulk_density(path, case, d):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/hopper"), help="default: out/hopper")
     parser.add_argument("--dimension", type=int, choices=(2, 3), default=2)
     parser.add_argument("--quick", action="store_true", help="fewer openings, a shorter time")
-    parser.add_argument("--height", type=float, help="of the loose fill [m]")
+    parser.add_argument("--height", type=positive, help="of the loose fill [m]")
     parser.add_argument("--measure", action="store_true", help="measure what an earlier run left in DIR")
     options = parser.parse_args()
     d, case = options.dimension, {2: PLANE, 3: SPACE}[options.dimension]
@@ -111,7 +111,7 @@ def main():
         case = SimpleNamespace(**{**vars(case), **QUICK[d]})
     diameter = case.smallest + case.largest
     rng = np.random.default_rng(1961)
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     low, high = [-case.half] * (d - 1) + [0.0], [case.half] * (d - 1) + [options.height or case.height]
     centres, radii = lattice(low, high, case.smallest, case.largest, rng)
     up = np.eye(d)[-1]
@@ -180,4 +180,4 @@ def draw(out, d, case, found, histories):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

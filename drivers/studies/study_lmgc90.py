@@ -18,9 +18,8 @@ import sys
 from pathlib import Path
 
 from oracle_table import Bounds
-from study_support import BINARIES, ENVIRONMENT, SOURCE, emptied, sized, write_csv
+from study_support import BINARIES, ENVIRONMENT, SOURCE, OneLineParser, claimed, emptied, positive, run_study, sized, whole, write_csv
 
-from one_line import OneLineParser
 
 OPTIONS = ["--homogeneous", "--drop-g0", "--slip", "1e-4"]
 FULL, QUICK = {"steps": 200, "seconds": 120.0}, {"steps": 20, "seconds": 10.0}
@@ -153,8 +152,8 @@ def main():
     parser.add_argument("examples", type=Path, nargs="+", help="directories of examples of LMGC90")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/lmgc90"), help="directory of the tables and runs; default: out/lmgc90")
     parser.add_argument("--quick", action="store_true", help="fewer steps")
-    parser.add_argument("--steps", type=int, help=f"most steps of a run ({FULL['steps']}, quick {QUICK['steps']})")
-    parser.add_argument("--seconds", type=float, help=f"most seconds of a run ({FULL['seconds']:g}, quick {QUICK['seconds']:g})")
+    parser.add_argument("--steps", type=whole(1), help=f"most steps of a run ({FULL['steps']}, quick {QUICK['steps']})")
+    parser.add_argument("--seconds", type=positive, help=f"most seconds of a run ({FULL['seconds']:g}, quick {QUICK['seconds']:g})")
     parser.add_argument("--pylmgc90", type=Path, help="directory that holds the Python package pylmgc90")
     parser.add_argument("--only", nargs="+", help="names of examples")
     options = sized(parser.parse_args(), FULL, QUICK)
@@ -162,7 +161,7 @@ def main():
         if not root.is_dir():
             parser.error(f"{root}: no such directory: expected examples of LMGC90, such as examples/RIGID_2D of its sources")
     options.out = options.out.resolve()
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     rows = []
     for root in (root.resolve() for root in options.examples):
         for folder in examples_of(root):
@@ -183,4 +182,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

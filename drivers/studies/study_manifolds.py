@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Random and degenerate pairs of polyhedra: distance, normal and points of contact against independent oracles.
+"""Distance, normal and points of contact of random and degenerate pairs of polyhedra, against independent computations.
 
     python3 drivers/studies/study_manifolds.py [--quick] [--count N] [--seed N] [--jobs N]
 
@@ -13,6 +13,8 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+
+from study_support import OneLineParser, run_study, whole
 
 #: column of the program's table: what is accepted (of duality: in parts of what rounding allows, 1e-12 of the size and more for short ways)
 ACCEPTED = {"duality": 1.0, "distance": 1e-12, "normal": 1e-9}
@@ -51,11 +53,11 @@ def read(text):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--count", type=int, help="pairs, of all jobs together")
-    parser.add_argument("--seed", type=int, default=101)
-    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--count", type=whole(1), help="pairs, of all jobs together")
+    parser.add_argument("--seed", type=whole(0), default=101)
+    parser.add_argument("--jobs", type=whole(1), default=1)
     options = parser.parse_args()
     if options.jobs < 1:
         parser.error(f"--jobs {options.jobs}: expected 1 or more")
@@ -88,4 +90,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

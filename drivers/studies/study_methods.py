@@ -15,14 +15,11 @@ than minutes. The closing table has each measured quantity beside what is accept
 
 import argparse
 import csv
-import os
 import re
-import sys
-from pathlib import Path
 
 import numpy as np
 from bounds_of_methods import accepted, differences
-from study_support import plt, read_history, run, write_csv
+from study_support import OneLineParser, claimed, plt, read_history, run, run_study, write_csv
 from whole_file import save_figure
 
 #: name: dimension, grains along each axis, steps of settling; 1e5 as high as 1e4
@@ -332,15 +329,14 @@ def study(directory, listed, path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", default="out/methods", help="directory of the results; default: out/methods")
     size = parser.add_mutually_exclusive_group()
     size.add_argument("--quick", action="store_true", help="fewer cases")
     size.add_argument("--large", action="store_true", help="packings of 10^4 and 10^5 grains")
     parser.add_argument("--redraw", action="store_true", help="draw from the CSV files")
     options = parser.parse_args()
-    directory = Path(options.out)
-    os.makedirs(directory, exist_ok=True)
+    directory = claimed(options.out)
     if options.large:
         if not options.redraw:
             study(directory, large_cases(), directory / "methods_large.csv")
@@ -359,4 +355,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

@@ -12,10 +12,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from study_support import emptied, gravier, run, write_csv
+from study_support import OneLineParser, claimed, emptied, gravier, run, run_study, whole, write_csv
 
 from gravier.shapes import axes_of
-from one_line import OneLineParser
 
 #: solid: volume in a sphere of radius 1, solid fraction poured and shaken (Baker and Kudrolli), densest packing known
 SOLIDS = {
@@ -85,7 +84,7 @@ def main():
     parser = OneLineParser(prog="study_platonic", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/platonic"), help="default: out/platonic")
     parser.add_argument("--quick", action="store_true", help="200 of each in the place of 600")
-    parser.add_argument("--count", type=int, metavar="N", help="solids of each kind")
+    parser.add_argument("--count", type=whole(1), metavar="N", help="solids of each kind")
     parser.add_argument("--solids", nargs="+", choices=list(SOLIDS), default=list(SOLIDS), metavar="NAME", help=", ".join(SOLIDS))
     options = parser.parse_args()
     count = options.count or (200 if options.quick else 600)
@@ -93,6 +92,7 @@ def main():
     width = np.cbrt(count / 0.55 / 1.6)
     if count < 20:
         parser.error(f"--count {count}: expected 20 or more")
+    claimed(options.out)
     rows = []
     for solid in options.solids:
         _, loose, dense, densest = SOLIDS[solid]
@@ -113,4 +113,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -18,9 +18,8 @@ from pathlib import Path
 
 import numpy as np
 from oracle_table import Table
-from study_support import plt, read_history, run, write_csv
+from study_support import OneLineParser, claimed, plt, positive, read_history, run, run_study, write_csv
 
-from one_line import OneLineParser
 from whole_file import save_figure
 
 #: friction between grains, counts of the lattice that each run begins with, and its spacing, by dimension
@@ -155,7 +154,7 @@ def main():
     parser = OneLineParser(description=__doc__)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/rheology"), help="default: out/rheology")
     parser.add_argument("--quick", action="store_true", help="fewer inertial numbers, and less strain")
-    parser.add_argument("--least", type=float, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
+    parser.add_argument("--least", type=positive, nargs="+", metavar="I", help="smallest inertial number of disks and of spheres, one or two "
                         "numbers (1e-3); the least there are is 1e-4")
     options = parser.parse_args()
     if options.least and len(options.least) > 2:
@@ -166,7 +165,7 @@ def main():
     for dimension, taken in NUMBERS.items():
         if least[dimension] > max(taken):
             parser.error(f"--least {least[dimension]:g}: expected at most {max(taken):g}")
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     found = {}
     for dimension in (2, 3):
         strains = QUICK[dimension] if options.quick else {number: taken for number, taken in NUMBERS[dimension].items() if number >= least[dimension]}
@@ -182,4 +181,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -24,10 +24,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 from oracle_table import Bounds
-from study_support import BINARIES, ENVIRONMENT, emptied, plt, read_history, sized, states, write_csv
+from study_support import BINARIES, ENVIRONMENT, OneLineParser, claimed, emptied, plt, read_history, run_study, sized, states, whole, write_csv
 
 import gravier
-from one_line import OneLineParser
 from study_lmgc90 import convert, generate
 
 
@@ -280,8 +279,8 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/side_by_side"), help="directory of the tables, the picture and the runs; default: out/side_by_side")
     parser.add_argument("--pylmgc90", type=Path, required=True, help="directory that holds the Python package pylmgc90")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK['steps']} steps")
-    parser.add_argument("--steps", type=int, help=f"steps ({FULL['steps']}, quick {QUICK['steps']})")
-    parser.add_argument("--settle", type=int, default=0, help="steps that LMGC90 makes before (0)")
+    parser.add_argument("--steps", type=whole(1), help=f"steps ({FULL['steps']}, quick {QUICK['steps']})")
+    parser.add_argument("--settle", type=whole(0), default=0, help="steps that LMGC90 makes before (0)")
     options = sized(parser.parse_args(), FULL, QUICK)
     options.out = options.out.resolve()
     there = subprocess.run([sys.executable, "-c", "from pylmgc90 import chipy; chipy.Initialize"], capture_output=True, text=True, check=False,
@@ -290,6 +289,7 @@ def main():
         print(f"study_side_by_side: LMGC90 is not in {options.pylmgc90}: {(there.stderr.strip().splitlines() or ['?'])[-1]}: expected a directory with "
               "pylmgc90 and its module chipy", file=sys.stderr)
         return 2
+    claimed(options.out)
     results = [compare(example.resolve(), options) for example in options.examples]
     rows, kept = [row for row, _ in results], [kept for _, kept in results]
     write_csv(options.out / "study_side_by_side.csv", {name: [row[name] for row in rows] for name in rows[0]})
@@ -303,4 +303,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

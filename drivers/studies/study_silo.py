@@ -7,12 +7,11 @@ sigma = rho g lambda (1 - exp(-z/lambda)), lambda = width / (2 mu K).
 leaves in DIR study_silo.csv, study_silo_summary.csv and study_silo.png. --quick takes a lower fill and means over a shorter time.
 The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is missed."""
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import draw_disks, lattice, plt, run, sized, states, write_csv, write_hdf5
+from study_support import OneLineParser, claimed, draw_disks, lattice, plt, run, run_study, sized, states, whole, write_csv, write_hdf5
 from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.004, 0.006  # m
@@ -98,14 +97,14 @@ def accepted(summary):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = OneLineParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/silo"), help="default: out/silo")
     parser.add_argument("--quick", action="store_true", help="a lower fill, means over a shorter time")
-    parser.add_argument("--layers", type=int, help=f"of the loose fill ({FULL['layers']}, quick {QUICK['layers']})")
-    parser.add_argument("--sampling", type=int,
+    parser.add_argument("--layers", type=whole(1), help=f"of the loose fill ({FULL['layers']}, quick {QUICK['layers']})")
+    parser.add_argument("--sampling", type=whole(1),
                         help=f"steps over which means are taken ({FULL['sampling']}, quick {QUICK['sampling']})")
     options = sized(parser.parse_args(), FULL, QUICK)
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     centres, radii = lattice([0.0, 0.0], [WIDTH, options.layers * 2.05 * LARGEST], SMALLEST, LARGEST, np.random.default_rng(1895))
     lower(options, centres, radii)
     depth, vertical, lateral, hydrostatic, held, bottom, position = profiles(options.out / "silo/results.h5", radii)
@@ -153,4 +152,4 @@ def draw(path, depth, stresses, fit, disks):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_study(main)

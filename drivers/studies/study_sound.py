@@ -16,9 +16,8 @@ from pathlib import Path
 
 import numpy as np
 from oracle_table import Table
-from study_support import hdf5_file, read_bodies, run, states, whole_file, write_csv
+from study_support import OneLineParser, claimed, hdf5_file, read_bodies, run, run_study, states, whole_file, write_csv
 
-from one_line import OneLineParser
 
 RADIUS = 0.01  # m
 DENSITY = 1000.0  # kg/m^2
@@ -168,7 +167,7 @@ def main():
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/sound"), help="default: out/sound")
     parser.add_argument("--quick", action="store_true", help="smaller cells")
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
+    claimed(options.out)
     table = Table()
     count = 32
     line = chain(count)
@@ -204,4 +203,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

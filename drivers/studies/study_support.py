@@ -21,6 +21,7 @@ except ImportError as missing:
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.collections import EllipseCollection
+from one_line import OneLineParser, positive, run_tool, whole  # noqa: F401
 from whole_file import hdf5_file, whole_file
 
 SOURCE = Path(__file__).resolve().parents[2]
@@ -106,17 +107,46 @@ def read_bodies(path):
 MARK = ".made_by_a_study"
 
 
-def emptied(directory):
-    """An empty directory for a study. What an older study has left there goes; a directory with anything else ends the study with status 2."""
-    directory = Path(directory)
-    if directory.exists() and not (directory.is_dir() and ((directory / MARK).exists() or not any(directory.iterdir()))):
+def refuse_foreign(directory):
+    """A directory with anything that no study has made ends the study with status 2."""
+    made = directory.is_dir() and (not any(directory.iterdir()) or (directory / MARK).exists() or any(directory.glob(f"*/{MARK}")))
+    if directory.exists() and not made:
         print(f"{Path(sys.argv[0]).stem}: {directory}: there is something that no study has made, which is not replaced; expected another --out",
               file=sys.stderr)
         sys.exit(2)
+
+
+def claimed(directory):
+    """The directory in which a study leaves its tables and runs, made if there is none. What an older study has left there stays until it is
+    replaced; a directory with anything else ends the study with status 2."""
+    directory = Path(directory)
+    refuse_foreign(directory)
+    directory.mkdir(parents=True, exist_ok=True)
+    (directory / MARK).touch()
+    return directory
+
+
+def emptied(directory):
+    """An empty directory for a run of a study. What an older study has left there goes; a directory with anything else ends the study with
+    status 2."""
+    directory = Path(directory)
+    refuse_foreign(directory)
     shutil.rmtree(directory, ignore_errors=True)
     directory.mkdir(parents=True)
     (directory / MARK).touch()
     return directory
+
+
+def run_study(main):
+    """Run a study and exit with its status. A file that cannot be read or written is told in one line, with status 2."""
+    def told():
+        try:
+            return main()
+        except OSError as error:
+            said = f"{error.filename}: {error.strerror}" if error.filename else " ".join(str(error).split())
+            print(f"{Path(sys.argv[0]).stem}: {said}", file=sys.stderr)
+            return 2
+    run_tool(told)
 
 
 def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier"):

@@ -19,7 +19,7 @@ module gravier_command_line
     & "       gravier --check CASE.nml    read and check it, say what a run would do, run nothing"//nl// &
     & "       gravier --keys              reference of all input keys, in Markdown"//nl// &
     & "       gravier --version | --help"//nl// &
-    & "exit status: 0 done and converged; 2 bad input or usage; 3 a solve did not reach its tolerance; 4 anything else"
+    & "exit status: 0 done and converged; 2 bad input or usage; 3 a solve did not converge; 4 anything else"
 
   type :: arguments_t
     integer :: action = action_run

@@ -292,7 +292,7 @@ contains
       is_there = number_of_groups(found, groups(g)%name) > 0
       if (is_there .and. group_count(config, groups(g)%name) == 0) then
         call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" belongs to bodies = '" &
-                   //trim(groups(g)%bodies)//"', expected without it where bodies = '"//trim(config%scene%bodies)//"'")
+                   //trim(groups(g)%bodies)//"'; expected none where bodies = '"//trim(config%scene%bodies)//"'")
       else if (group_count(config, groups(g)%name) > 0 .and. .not. is_there) then
         call raise(error, status_input, config%file//": group &"//trim(groups(g)%name)//" is missing: expected &" &
                    //trim(groups(g)%name)//" ... /, required by bodies = '"//trim(groups(g)%bodies)//"'")

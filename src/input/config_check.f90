@@ -110,7 +110,7 @@ contains
     if (belongs(config, key, report%instance)) return
     call raise(error, status_input, report%file//": "//label(report, key%group)//" " &
                //shown_text(report, key%group, key%name)//": "//trim(key%name)//" belongs to "//trim(key%chooser)//" = " &
-               //choices_text(key%chosen)//", expected without it where "//trim(key%chooser)//" = '" &
+               //choices_text(key%chosen)//"; expected none where "//trim(key%chooser)//" = '" &
                //chosen_word(config, key, report%instance)//"'")
   end subroutine check_owner
 
@@ -178,7 +178,7 @@ contains
       call expect(report, reaches(report, "scene", "gravity", scene%dimension), "scene", "gravity", error, &
                   to_text(scene%dimension)//" numbers")
       call expect(report, scene%gravity_table == "" .or. .not. is_given(report, "scene", "gravity"), "scene", "gravity", error, &
-                  "a scene without it where "//shown_text(report, "scene", "gravity_table")//" replaces it")
+                  "none where "//shown_text(report, "scene", "gravity_table")//" replaces it")
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_distance_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
       call expect(report, scene%list_steps >= 0.0_dp, "scene", "list_steps", error)

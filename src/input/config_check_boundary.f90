@@ -155,7 +155,7 @@ contains
 
     if (.not. any(boundary%free)) then
       is_absent = .not. is_given(report, "boundary", "mass")
-      call expect(report, is_absent, "boundary", "mass", error, "a boundary without it where no component is free")
+      call expect(report, is_absent, "boundary", "mass", error, "none where no component is free")
       return
     end if
     call miss(report, "boundary", "mass", error, shown_text(report, "boundary", "free"))

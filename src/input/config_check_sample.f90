@@ -51,7 +51,7 @@ contains
       call expect(report, all(period <= 0.0_dp .or. abs(sample%box - period) <= 0.0_dp), "sample", "box", error, &
                   "the same sizes as &scene "//shown_text(report, "scene", "period")//" along each axis that is periodic")
       call expect(report, sample%box(nd) <= 0.0_dp .or. .not. is_given(report, "sample", "solid_fraction"), &
-                  "sample", "solid_fraction", error, "a sample without it where the last size of the box is given")
+                  "sample", "solid_fraction", error, "none where the last size of the box is given")
       call expect(report, sample%solid_fraction > 0.0_dp .and. sample%solid_fraction < 0.6_dp, &
                   "sample", "solid_fraction", error)
     end associate

@@ -155,7 +155,7 @@ module gravier_config_table
            "the wall of the bodies that it is: `'-x'`, `'+x'`, `'-y'`, ... by the side on which it lies, or the identifier of "// &
            "a wall of the bodies file", note="required", chooser="shape", chosen=wall_of_bodies), &
      key_t("boundary", "velocity", kind_real, "3*0", "", &
-           "prescribed velocity, of `free` components that at the start; its third component is 0 in 2D", &
+           "prescribed velocity; of a `free` component the velocity at the start; its third component is 0 in 2D", &
            count=3, unit="m/s"), &
      key_t("boundary", "rotation", kind_real, "3*0", "", &
            "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &
@@ -230,8 +230,8 @@ module gravier_config_table
   type(key_t), parameter :: solver_keys(*) = &
     [key_t("solver", "method", kind_choice, "'nlgs'", "", ""), &
      key_t("solver", "criterion", kind_choice, "'velocity_error'", "velocity_error residual error", &
-           "what ends a solve: the estimated velocity error, with the residual as a guard; the residual, with ten times "// &
-           "the other as a guard where boundaries move; the known error on the impulses of `bodies = 'column'`"), &
+           "what ends a solve: the estimated velocity error, with the residual as a guard; the residual, where boundaries "// &
+           "move with a velocity error of at most ten times `accuracy`; the known error on the impulses of `bodies = 'column'`"), &
      key_t("solver", "accuracy", kind_real, "0.1", "> 0", &
            "estimated velocity error over the velocity scale at which a solve has converged; with another criterion the "// &
            "closing lines count the solves that miss it"), &
@@ -263,8 +263,8 @@ module gravier_config_table
            "bodies at rest stand still and leave the contact problem until something disturbs them"), &
      key_t("solver", "sleep_after", kind_integer, "20", ">= 1", "steps at rest after which a body sleeps"), &
      key_t("solver", "sleep_speed", kind_real, "-1", "> 0", &
-           "twice the largest mass times velocity of a body at rest, relative to the root mean square of the impulses; "// &
-           "it is at most a tenth of the impulses on it, too", &
+           "a body is at rest if its momentum is at most half of this times the root mean square of the impulses, and at "// &
+           "most a twentieth of the normal impulses on it", &
            note="100 times `tolerance`"), &
      key_t("solver", "on_failure", kind_choice, "'continue'", "continue stop discard", &
            "after a solve that gave up: go on; write the step and stop; stop without it. "// &
@@ -282,8 +282,8 @@ module gravier_config_table
            note="the product of `grid` if given, else `1`"), &
      key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
      key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
-           "largest over mean number of contacts of a subdomain that asks for a new partition, where it exceeds 1.1 times "// &
-           "what the last one reached; 0: never")]
+           "a new partition is made if the largest over the mean number of contacts of a subdomain exceeds this value and "// &
+           "1.1 times what the last partition reached; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
     [key_t("enriched", "direction", kind_real, "0", ">= 0", &

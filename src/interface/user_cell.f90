@@ -18,8 +18,8 @@ module gravier_user_cell
 contains
 
   !> A quantity of the cell now: a length or a tilt of its edges [m], a strain or a shear since the start of the scene, a rate
-  !> [1/s], or a stress that is held [Pa, N/m in 2D], 0 where a component has a rate. Failure (status_input): an unknown name, a cell
-  !> that does not move.
+  !> [1/s], or a stress that is held [Pa, N/m in 2D], 0 where a component has a rate. Failure (status_input): an unknown name, a
+  !> cell that does not move.
   subroutine get_cell(loop, name, value, error)
     type(user_loop_t), intent(in) :: loop
     character(len=*), intent(in) :: name

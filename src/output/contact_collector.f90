@@ -3,6 +3,7 @@ module gravier_contact_collector
   use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: contact_arms, lane_of, block_of
   use gravier_contact_places, only: find_contact_place
+  use gravier_contact_springs, only: find_elongation
   use gravier_contact_law, only: unused
   use gravier_contact_problem, only: subproblem_t
   use gravier_field_list, only: field_list_t
@@ -18,7 +19,8 @@ contains
 
   !> Contacts of this rank: the table `contacts` with the keys `candidate` and `antagonist`, identifiers of bodies or boundaries.
   !> The fields are `normal` (nd), `gap` [m], `impulse` on the candidate (nd; n, t[, s]) [N s], `moment` on it (about n[, t, s])
-  !> [N m s], `point` where bodies have shapes (nd) [m], the place of the contact when it was detected, `normal_force` and
+  !> [N m s], `point` where bodies have shapes (nd) [m], the place of the contact when it was detected, `elongation` of tangential
+  !> springs where there are some (nd) [m], the way of the candidate against the antagonist, `normal_force` and
   !> `tangential_force` [N], `status`, and `points` (6) [m], the centre of the candidate and that of the antagonist's nearest image,
   !> or the boundary, at that time.
   subroutine collect_contacts(simulation, names, table)
@@ -76,6 +78,8 @@ contains
       n = merge(2*simulation%problem%kernels%nd - 3, 0, simulation%problem%kernels%rolling_row > 0)
     case ("point")
       n = merge(simulation%problem%kernels%nd, 0, simulation%problem%kernels%row%arm_i > 0)
+    case ("elongation")
+      n = merge(simulation%problem%kernels%nd, 0, simulation%halo%memory%n_spring > 0)
     case ("points")
       n = 6
     case default
@@ -89,7 +93,7 @@ contains
     character(len=:), allocatable :: unit
 
     select case (name)
-    case ("gap", "point", "points")
+    case ("gap", "point", "points", "elongation")
       unit = "m"
     case ("impulse")
       unit = "N s"
@@ -167,6 +171,10 @@ contains
         end do
       case ("point")
         call take_places(simulation, s, values)
+      case ("elongation")
+        do c = 1, sub%n_contacts
+          call find_elongation(simulation%halo%view(s)%list, sub, c, values(:, c))
+        end do
       case ("points")
         if (kernels%row%arm_i > 0) then
           call take_ways(simulation, s, values)

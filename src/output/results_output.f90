@@ -33,7 +33,8 @@ module gravier_results_output
   end type results_output_t
 
   !> of a contact; NaN is looked for in this order
-  character(len=7), parameter :: contact_fields(5) = [character(len=7) :: "normal", "impulse", "moment", "gap", "point"]
+  character(len=10), parameter :: contact_fields(6) = [character(len=10) :: "normal", "impulse", "moment", "gap", "point", &
+    & "elongation"]
 
 contains
 

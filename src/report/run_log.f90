@@ -16,7 +16,8 @@ module gravier_run_log
   use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
     & warn_relaxation, warn_partition, warn_springs, warn_deep, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
-  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning, fast_warning
+  use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, distance_line, most_by_spring, spring_warning, &
+    & fast_warning
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
@@ -253,7 +254,8 @@ contains
     character(len=:), allocatable :: text, more
     integer :: number
 
-    if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation), "", error)
+    if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation)// &
+      & distance_line(simulation), "", error)
     call scale_warnings(simulation, scales, text, warnings)
     call inflow_warnings(simulation, more, number)
     warnings = warnings + number

@@ -114,7 +114,7 @@ contains
       if (tally%inaccurate > 0) then
         text = to_text(tally%inaccurate)//" of them missed the accuracy "//to_text(simulation%config%solver%accuracy, 2)
         if (tally%worst_error > simulation%config%solver%accuracy) then
-          text = text//", with velocities wrong by up to "//plain(tally%worst_error)//" of U"
+          text = text//", with velocities wrong by up to "//plain(tally%worst_error)//" times the velocity scale U"
         else
           text = text//", because single bodies or contacts are farther off than the mean"
         end if
@@ -181,9 +181,9 @@ contains
       end if
       if (tally%worst_error > far_off .and. .not. (simulation%failed == 0 .and. is_doubtful(simulation))) text = text// &
         & trim(merge(", but", ";    ", simulation%failed == 0))//" velocities were wrong by up to "//plain(tally%worst_error)// &
-        & " of U in "//to_text(tally%far_off)//" of "//steps
+        & " times the velocity scale U in "//to_text(tally%far_off)//" of "//steps
       if (tally%mended_share() > often_mended) then
-        text = text//"; overlaps were mended in "//percent(tally%mended_share())//" of "//steps
+        text = text//"; overlaps were projected in "//percent(tally%mended_share())//" of "//steps
         if (tally%shift < little*tally%path) then
           text = text//", by "//plain(100.0_dp*tally%shift/tally%path)//" % of the paths of grains"
         else
@@ -302,9 +302,9 @@ contains
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
       else if (may_loosen(simulation)) then
-        text = "no single key suffices; a longer &time step makes fewer steps, at the price of accuracy"
+        text = "no change of one key suffices; a longer &time step makes fewer steps, at the price of accuracy"
       else
-        text = "no single key suffices without making the results worse"
+        text = "no change of one key suffices without making the results worse"
       end if
     end associate
   end function halving_text

@@ -8,7 +8,7 @@ module gravier_scale_report
   use gravier_scene_scales, only: scene_scales_t
   implicit none
   private
-  public :: scale_lines, scale_warnings, error_scale_line, most_by_spring, spring_warning, fast_warning
+  public :: scale_lines, scale_warnings, error_scale_line, distance_line, most_by_spring, spring_warning, fast_warning
 
   character(len=*), parameter :: newline = new_line("a")
   !> digits of a figure
@@ -68,6 +68,20 @@ contains
     text = "            velocity errors are compared with U = "//figure(simulation%velocity_scale%value)//" m/s ("// &
       & trim(simulation%velocity_scale%kind)//")"//newline
   end function error_scale_line
+
+  !> The distances that decide what is a contact, how long lists last and which overlaps are removed, whatever rule gives them.
+  function distance_line(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (rule => simulation%decomposition%rule)
+      text = "distances   contacts have gaps of at most "//figure(rule%alert_distance)//" m (alert_distance), lists reach "// &
+        & figure(rule%skin)//" m further (skin)"
+      if (simulation%overlap_allowed < huge(1.0_dp)) text = text//", overlaps above "//figure(simulation%overlap_allowed)// &
+        & " m are projected (overlap_allowed)"
+    end associate
+    text = text//newline
+  end function distance_line
 
   !> Warnings, each a line ended by a newline, and their number.
   subroutine scale_warnings(simulation, scales, text, number)

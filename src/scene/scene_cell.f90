@@ -158,12 +158,12 @@ contains
         if (moved(a, b)) call check_axis("shear", a, b)
       end associate
     end do
-    if (n_boundaries > 0) call refuse("&boundary", "a cell without boundaries and outlets")
-    if (size(config%insertions) > 0) call refuse("&insertion", "a cell that no grains enter")
+    if (n_boundaries > 0) call refuse("&boundary", "no boundaries and outlets")
+    if (size(config%insertions) > 0) call refuse("&insertion", "no insertion of grains")
     if (size(config%regions) > 0) call refuse("&region", "no regions of means")
     if (config%solver%sleeping) call refuse("&solver sleeping = .true.", ".false.")
-    if (config%solver%method == "newton" .and. any(drive%driven)) call refuse("&solver method = 'newton'", &
-      & "a method that sweeps where stresses drive the cell")
+    if (config%solver%method == "newton" .and. any(drive%driven)) call raise(error, status_input, config%file// &
+      & ": &solver method = 'newton': expected another method where stresses drive the periodic cell")
     if (config%decomposition%subdomains > most_subdomains) call refuse("&decomposition subdomains = "// &
       & to_text(config%decomposition%subdomains), to_text(most_subdomains)//" at most")
 

@@ -40,8 +40,8 @@ contains
     call move_alloc(means, more(1)%diagnostic)
   end subroutine make_region_means
 
-  !> Refuse regions that are longer than a period of the scene, in which a grain would be twice, and those that are farther than a
-  !> period from the cell.
+  !> Refuse regions that are longer than a period of the scene, in which a grain would be twice, and those that are farther than
+  !> two periods from the cell.
   subroutine check_mean_regions(config, period, error)
     type(config_t), intent(in) :: config
     type(period_t), intent(in) :: period
@@ -61,7 +61,8 @@ contains
         if (fits .and. abs(low - period%origin(d)) <= 2.0_dp*period%length(d)) cycle
         call raise(error, status_input, config%file//": &region '"//trim(config%regions(r)%name)//"': from "//to_text(low, 4)// &
           & " m to "//to_text(high, 4)//" m along "//axes(d:d)//": expected a region with an inside, no longer than the "// &
-          & "period, "//to_text(period%length(d), 4)//" m, and near the cell; a side that is left out is that of the cell")
+          & "period, "//to_text(period%length(d), 4)//" m, and within two periods of the cell; a side that is left out is "// &
+          & "that of the cell")
         return
       end do
     end do

@@ -200,6 +200,22 @@ class OwnFiles(RunTestCase):
         self.assertEqual(os.listdir(os.path.join(elsewhere, "build")), ["release"])
         self.assertEqual(os.listdir(os.path.join(elsewhere, "build/release")), ["mine.txt"])
 
+    def test_the_launcher_refuses_before_it_builds(self):
+        tree = os.path.join(os.path.realpath(self.work), "refusing")
+        os.makedirs(tree)
+        launcher = shutil.copy(os.path.join(SOURCE, "gravier"), tree)
+        for arguments, more, line in (
+                (["run", "none.nml"], {}, "none.nml: no such file; expected a case"),
+                (["run", "-n", "0", "none.nml"], {}, "-n expects a number of ranks, 1 or more; found '0'"),
+                (["test", "all"], {}, "test takes no argument but quick or long; found 'all'"),
+                (["demo"], {"GRAVIER_PYTHON": "/bin/false"}, "GRAVIER_PYTHON=/bin/false: expected a python3 with h5py, numpy and matplotlib")):
+            done = subprocess.run([launcher, *arguments], cwd=tree, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ, **more})
+            self.assertEqual((done.returncode, done.stderr), (2, f"gravier: {line}\n"), arguments)
+        shutil.rmtree(os.path.join(tree, "build"), ignore_errors=True)
+        write(os.path.join(tree, "build"), "a file")
+        done = subprocess.run([launcher, "build"], cwd=tree, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ})
+        self.assertEqual((done.returncode, done.stderr), (2, f"gravier: {tree}/build: expected a directory that can be written to\n"))
+
 
 if __name__ == "__main__":
     unittest.main()

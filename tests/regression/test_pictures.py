@@ -6,6 +6,8 @@ import subprocess
 import sys
 import types
 import unittest
+import unittest.mock
+from types import SimpleNamespace
 
 import matplotlib.colors
 import matplotlib.image
@@ -272,6 +274,27 @@ class Pictures(RunTestCase):
             self.assert_apart(box, (*(centre - radius), *(centre + radius)), "a number and a sphere")
         plt.close(figure)
 
+    def test_planes_within_the_box(self):
+        """A plane along the axes that is no face of the box is drawn: filled behind its bodies, an outline before them."""
+        rows = gravier.Table({"shape": np.array(["plane"] * 4), "position": np.array([[0.5, 0.0, 0.0], [0.7, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+                              "normal": np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])})
+        walls = SimpleNamespace(planes=lambda: (rows.position, rows.normal), polygons=lambda: [], cylinders=lambda: [], facets=np.zeros((0, 3, 3)))
+        view = picture_space.View(3, 20.0, 20.0)
+        figure, axes = plt.subplots()
+        low, high = np.zeros(3), np.ones(3)
+        picture_space.draw_space(axes, view, walls, low, high)
+        drawn = {}
+        for patch in axes.patches:
+            for x in (0.5, 0.7):
+                corners = view.place(np.array([[x, y, z] for y in (0.0, 1.0) for z in (0.0, 1.0)]))
+                if all(np.linalg.norm(patch.get_xy() - corner, axis=1).min() < 1e-9 for corner in corners):
+                    drawn[x] = patch.get_facecolor()
+        self.assertEqual(sorted(drawn), [0.5, 0.7])
+        self.assertEqual([drawn[0.5][3], drawn[0.7][3]], [1.0, 0.0])
+        # the floor is a face, and a plane on the far face that looks away from the box is none of its walls
+        self.assertEqual([picture_space.is_face(point, normal, low, high) for point, normal in zip(rows.position, rows.normal)], [False, False, True, False])
+        plt.close(figure)
+
     def test_cut_box(self):
         """A plane through the middle of a cube across its diagonal cuts a regular hexagon out of it."""
         points = picture_space.cut_box(np.full(3, 0.5), np.full(3, 3.0**-0.5), np.zeros(3), np.ones(3))
@@ -353,6 +376,13 @@ class Pictures(RunTestCase):
                 np.testing.assert_array_equal(values, rows.stress[:, "xyz".index(name[0]), "xyz".index(name[1])])
         np.testing.assert_array_equal(curve_pictures.components(rows, "stress_yx", 3, 2)[None], rows.stress[:, 1, 0])
         np.testing.assert_array_equal(curve_pictures.components(rows, "velocity_z", 3, 2)[None], [1.0, 1.0, np.nan])
+        # of several states, whose colours are those of times, each of the five has a dash of its own
+        figure, axes = plt.subplots()
+        states = gravier.Table({**rows, "centre": np.zeros((3, 3))})
+        with unittest.mock.patch.object(axes, "plot") as plot:
+            curve_pictures.draw_column(axes, SimpleNamespace(dimension=3), [states, states], "stress", 2, ["k", "r"])
+        self.assertEqual(len({str(call.kwargs["linestyle"]) for call in plot.call_args_list[:5]}), 5)
+        plt.close(figure)
         figure = curve_pictures.draw_profile(self.disks, "layers", None, ["stress_xy", "velocity_x"], False)
         self.assertEqual([axes.get_xlabel().split(" [")[0] for axes in figure.axes], ["stress xy", "velocity x"])
         np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), self.disks.region("layers").stress[:, 0, 1])

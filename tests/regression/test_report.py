@@ -153,7 +153,7 @@ class Report(RunTestCase):
         history = log.history()
         worst = (history.velocity_error / history.velocity_scale).max()
         self.assertIn(f"at most {worst:.2g} of U", self.answer(page, "Was the accuracy")[2])
-        self.assertIn(f"was {history.max_overlap.max():.2g} m", self.answer(page, "Was the geometry")[2])
+        self.assertIn(f"was {history.max_overlap.max():.2g} m", self.answer(page, "Were overlaps")[2])
         # start and end, a profile, four groups of curves
         self.assertEqual(len(page.images), 2 + 1 + 4)
         with open(self.here("good/results/run.log"), encoding="utf-8") as file:
@@ -172,7 +172,7 @@ class Report(RunTestCase):
         (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J, of 1.0 J turned over\n"))
         self.assertIn("since the last restart", answer.text)
 
-    def test_mended(self):
+    def test_projected(self):
         """Projections are judged as the last words judge them, by how often and how far they shift grains; those before a restart count."""
         def history(steps, projected):
             table = gravier.results.Table(step=np.arange(1, steps + 1), max_overlap=np.full(steps, 1e-4), projected=np.zeros(steps))
@@ -193,7 +193,7 @@ class Report(RunTestCase):
                 (restart + none, 300, 42, "doubt", "Yes, often: before the restart, projected in 21 % of 200 steps"),
                 (restart + seldom.format("1.8E-07"), 300, 0, "good", "A little: projected in 3 of 100 steps"),
                 (restart + often.format("2.0E-02"), 300, 2, "bad", "before the restart, projected in 1 % of 200 steps")):
-            answer = verdict.mended(RunLog(text), history(steps, projected))
+            answer = verdict.projected(RunLog(text), history(steps, projected))
             self.assertEqual(answer.grade, grade, text)
             self.assertIn(words, answer.text)
 
@@ -330,7 +330,7 @@ class Report(RunTestCase):
         history = gravier.Run(self.here("good/results")).history()
         worst = (history.velocity_error / history.velocity_scale).max()
         self.assertIn(f"at most {worst:.2g} of U", self.answer(page, "Was the accuracy")[2])
-        self.assertRegex(self.answer(page, "Was the geometry")[2], "The largest overlap was in the first step at most .* of the mean radius")
+        self.assertRegex(self.answer(page, "Were overlaps")[2], "The largest overlap was in the first step at most .* of the mean radius")
         self.assertRegex(self.answer(page, "Are its files")[2], r"^Not all: \S+history.csv: No such file or directory; ")
 
     def test_files_of_two_runs(self):

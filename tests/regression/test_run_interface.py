@@ -55,8 +55,8 @@ class Commands(RunTestCase):
         for ranks in (1, 2):
             run = run_case(case, ranks, self.here(f"shrinks {ranks}"))
             self.assert_status(run, 0)
-            self.assertIn("warning     space cannot be divided anew, and the old partition is kept: &decomposition subdomains = 64: more "
-                          "subdomains than detection cells; expected at most 8 for this scene\n", run.stdout)
+            self.assertIn("warning     space cannot be divided anew, and the old partition is kept: &decomposition subdomains = 64: the "
+                          "scene is too small for so many subdomains; expected at most 8 for this scene\n", run.stdout)
             self.assertIn("warnings    partitions refused 2\n", run.stdout)
 
     def test_check(self):

@@ -70,7 +70,7 @@ class LastWords(RunTestCase):
         """Shifts that are small against the paths of grains are named, and said to be no other law."""
         write(self.here("fast.csv"), f"id,x,y,radius,vx\n1,0,0,{RADIUS},3\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3\n")
         run = run_case(merged(PAIR, {"scene": {"bodies_file": "../fast.csv"}, "time": {"steps": 9, "step": 1e-2}}), 1, self.here("fast"))
-        self.assertRegex(line(run, "finished"), r"overlaps were mended in 11 % of them, by 0\.65 % of the paths of grains; results in")
+        self.assertRegex(line(run, "finished"), r"overlaps were projected in 11 % of them, by 0\.65 % of the paths of grains; results in")
 
     def test_mended(self):
         """Lengths of shifts are those of the formula, and the last line says so in more than a tenth of the steps, on any ranks. In the
@@ -84,7 +84,7 @@ class LastWords(RunTestCase):
             found = re.search(r"projected in 1 of 3 steps \(33 %\): shifts of a grain add up to (\S+) m on average\n", run.stdout)
             self.assertTrue(found, run.stdout)
             self.assertAlmostEqual(float(found[1]), shift, delta=5e-6)
-            self.assertEqual(line(run, "finished"), "finished    all 3 steps reached the accuracy; overlaps were mended in 33 % of them: "
+            self.assertEqual(line(run, "finished"), "finished    all 3 steps reached the accuracy; overlaps were projected in 33 % of them: "
                              "the results are not those of the contact law; results in results")
             start, later = map(float, re.search(r"overlaps    in the first step at most (\S+) m, later at most (\S+) m", run.stdout).groups())
             self.assertAlmostEqual(start, OVERLAP, delta=5e-6)
@@ -188,7 +188,7 @@ class LastWords(RunTestCase):
         history = run.history()
         worst = (history["velocity_error"] / history["velocity_scale"])
         self.assertGreater(worst.max(), 0.5)
-        doubt = f"{(worst > 0.1).sum()} of them missed the accuracy 1.0E-01, with velocities wrong by up to {worst.max():.2f} of U"
+        doubt = f"{(worst > 0.1).sum()} of them missed the accuracy 1.0E-01, with velocities wrong by up to {worst.max():.2f} times the velocity scale U"
         self.assertIn(f"finished    every solve reached the residual 3.0E-02, but {doubt}; ", line(run, "finished"))
         self.assertIn(f"converged   only by the residual: every solve reached the tolerance 3.00E-02, but {doubt}; ", line(run, "converged"))
         found = re.search(r"residual at most (\S+) at the end of a solve, tolerance 3\.00E-02; velocity error at most (\S+) of U", run.stdout)
@@ -213,7 +213,7 @@ class LastWords(RunTestCase):
         self.assertEqual(list(history["iterations"]), [0, 0, 0])
         np.testing.assert_allclose(history["velocity_error"] / history["velocity_scale"], [1.0, 2.0, 3.0], rtol=1e-5)
         self.assertEqual(line(run, "finished"), "finished    every solve reached the residual 1.0E-04, but 3 of them missed the accuracy "
-                         "1.0E-01, with velocities wrong by up to 3.00 of U; results in results")
+                         "1.0E-01, with velocities wrong by up to 3.00 times the velocity scale U; results in results")
 
     def test_light_bodies(self):
         """A light disk that hangs in the air beside a heavy one at rest is nothing to the mean by mass, and still missed."""

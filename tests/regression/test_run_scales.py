@@ -70,6 +70,10 @@ class Scales(RunTestCase):
         self.figures(text, rf"scales      mean diameter d = {NUMBER} m; g h = {NUMBER} m/s, {NUMBER} mean diameters a step; sqrt\(g d\) = {NUMBER} m/s",
                      2 * RADIUS, G * 1e-3, G * 1e-6 / (2 * RADIUS), math.sqrt(2 * G * RADIUS))
         self.figures(text, rf"velocity errors are compared with U = {NUMBER} m/s \(load of a step\)", G * 1e-3)
+        lists = rf"distances   contacts have gaps of at most {NUMBER} m \(alert_distance\), lists reach {NUMBER} m further \(skin\)"
+        self.figures(text, lists + rf", overlaps above {NUMBER} m are projected \(overlap_allowed\)\n", 0.1 * RADIUS, 0.2 * RADIUS, 0.01 * RADIUS)
+        given = self.check_case(LATTICE, {"scene": {"alert_distance": 3e-4, "skin": 7e-4, "overlap_projection": False}})
+        self.figures(given, lists + "\n", 3e-4, 7e-4)
         self.assertEqual(self.warnings(text), [])
         # what the libraries of a process take differs from time to time
         memory = r"about \d+ MiB at most on a rank"

@@ -68,6 +68,47 @@ class Studies(unittest.TestCase):
         self.assertGreater(len(found), 15)
         self.assertLessEqual(NO_FILES | set(NAMED), found)
 
+    def test_options(self):
+        """Numbers that make no sense are refused in one line, and no study writes into a directory with anything else in it."""
+        for name, text in names():
+            with self.subTest(name):
+                self.assertNotRegex(text, r"argparse\.ArgumentParser\(|type=int\b(?!, choices)|type=float\b")
+                self.assertRegex(text, r"(?m)^    run_study\(main\)$")
+                if name != "manifolds":
+                    self.assertIn("claimed(options.out)", text)
+        with tempfile.TemporaryDirectory() as place:
+            Path(place, "mine.txt").touch()
+            for name, options, line in (
+                    ("silo", ["--layers", "0"], "argument --layers: '0': expected an integer >= 1; see"),
+                    ("manifolds", ["--count", "-3"], "argument --count: '-3': expected an integer >= 1; see"),
+                    ("hard", ["--ranks", "x"], "argument --ranks: 'x': expected an integer >= 1; see"),
+                    ("hard", ["--cases", "("], "--cases (: expected a regular expression: "),
+                    ("biaxial", ["--rate", "-1"], "argument --rate: '-1': expected a number > 0; see"),
+                    ("convergence", ["--parts", "none"], "--parts none: expected some of "),
+                    ("communication", ["none.h5", "--out", place], "none.h5: no such file; expected a bodies file"),
+                    ("masonry", ["--out", place], f"{place}: there is something that no study has made, which is not replaced; expected another --out"),
+                    ("sound", ["--out", place], f"{place}: there is something that no study has made")):
+                with self.subTest(name=name, options=options):
+                    run = subprocess.run([sys.executable, os.path.join(SOURCE, f"drivers/studies/study_{name}.py"), *options], cwd=place,
+                                         capture_output=True, text=True, check=False)
+                    self.assertEqual(run.returncode, 2, run.stderr)
+                    self.assertEqual(len(run.stderr.splitlines()), 1, run.stderr)
+                    self.assertIn(line, run.stderr)
+            self.assertEqual(os.listdir(place), ["mine.txt"])
+            # what a study has made is taken over by the next one, and a file that is missing is told
+            made = study_support.claimed(os.path.join(place, "made"))
+            (made / "study.csv").touch()
+            self.assertEqual(study_support.claimed(made), made)
+            self.assertTrue((made / "study.csv").exists())
+            self.assertFalse((study_support.emptied(made) / "study.csv").exists())
+
+            def main():
+                open(os.path.join(place, "none"), encoding="utf-8").close()
+            with contextlib.redirect_stderr(io.StringIO()) as said, self.assertRaises(SystemExit) as end:
+                study_support.run_study(main)
+            self.assertEqual(end.exception.code, 2)
+            self.assertIn(f"{place}/none: No such file or directory\n", said.getvalue())
+
     def test_programs_of_tests(self):
         """A study that runs a program of the tests names it in the line that the launcher reads."""
         pattern = re.search(r"sed -n 's/\^(TEST_PROGRAM = .*)\$/", Path(SOURCE, "gravier").read_text(encoding="utf-8"))[1]
@@ -92,7 +133,7 @@ class Studies(unittest.TestCase):
                 self.assertTrue(re.search(r"(?is)exit\s+status|ends with\s+status|the status\s+is", text),
                                 "does not say its status")
                 self.assertTrue(re.search("|".join(ENDS), main, re.MULTILINE), "does not end with the status of its table")
-                self.assertTrue("sys.exit(" in text, "does not leave its status")
+                self.assertIn("    run_study(main)", text, "does not leave its status")
 
 
 class ClosingTable(unittest.TestCase):
@@ -269,8 +310,8 @@ class ClosingTable(unittest.TestCase):
 
     def test_directories_of_others(self):
         """What no study has made stays; a directory of an older study is emptied."""
-        place = Path(self.scratch())
-        (place / "cube").mkdir(parents=True)
+        place = study_support.claimed(self.scratch())
+        (place / "cube").mkdir()
         (place / "cube/mine.txt").write_text("mine")
         done = subprocess.run([sys.executable, os.path.join(SOURCE, "drivers/studies/study_platonic.py"), "--out", str(place), "--solids", "cube", "--count", "20"],
                               capture_output=True, text=True, check=False)

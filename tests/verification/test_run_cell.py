@@ -263,13 +263,13 @@ class Cell(CellTestCase):
         moving = " in a periodic cell that moves\n"
         for groups, message in (
                 ({"boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}]},
-                 "&boundary: expected a cell without boundaries and outlets" + moving),
+                 "&boundary: expected no boundaries and outlets" + moving),
                 ({"insertion": [{"name": "in", "lower": [1.0, 1.0], "upper": [2.0, 2.0], "radius": 0.1, "rate": 1.0}]},
-                 "&insertion: expected a cell that no grains enter" + moving),
+                 "&insertion: expected no insertion of grains" + moving),
                 ({"region": [{"name": "r"}]}, "&region: expected no regions of means" + moving),
                 ({"solver": {"sleeping": True}}, "&solver sleeping = .true.: expected .false." + moving),
                 ({"solver": {"method": "newton"}},
-                 "&solver method = 'newton': expected a method that sweeps where stresses drive the cell" + moving),
+                 "&solver method = 'newton': expected another method where stresses drive the periodic cell\n"),
                 ({"solver": {"method": "nscdd"}, "decomposition": {"subdomains": 5000}},
                  "&decomposition subdomains = 5000: expected 4096 at most" + moving),
                 ({"scene": {"period": [7.6, 0.0], "cell_shear_rate": [0.0]}},

@@ -108,7 +108,7 @@ class CellDrives(CellTestCase):
                 ("time,shear_rate_xy\n0,1\n", {"scene": {"period": [7.6, 0.0]}},
                  "case.nml: &scene cell_shear_rate, or a stress in its place: expected a period along y"),
                 ("time,pressure_y\n0,1\n", {"solver": {"method": "newton"}},
-                 "case.nml: &solver method = 'newton': expected a method that sweeps where stresses drive the cell in a periodic cell that moves")):
+                 "case.nml: &solver method = 'newton': expected another method where stresses drive the periodic cell")):
             write(os.path.join(here, "cell.csv"), table)
             run = run_case(merged(LATTICE, plain, groups), directory=here, options=["--check"])
             self.assert_status(run, 2)

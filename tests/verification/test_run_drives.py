@@ -221,6 +221,22 @@ class Forces(SmallScene):
         self.assertGreater(history["projected"][0], 0)
         self.verify("grain on a floor that is shifted", "moment of the floor [N m]", history["moment_z:floor"][0], 0.3 * history["force_y:floor"][0], 1e-9)
 
+    def test_moment_of_a_plane_in_a_period(self):
+        """The lever of a contact with a plane is that of the image nearest to its pivot, whenever lists are made: a grain that slides over the
+        side of the cell has the opposite lever from then on."""
+        period, speed = 0.2, 1.0
+        for skin in (0.001, 0.03):
+            floor = plane([0.0, 0.0], [0.0, 1.0], name="floor", pivot=[0.5 * period, 0.0])
+            self.step = 1e-3
+            record = self.play(f"period {skin}", [Grain([0.15, 0.01], [speed, 0.0], radius=0.01, mass=1.0)], [floor], [0.0, -G], 120,
+                               scene={"friction": 0.0, "period": [period, 0.0], "skin": skin},
+                               output={"every": 0, "boundary_forces": True, "boundary_moments": True})
+            history = record.run.history()
+            place = 0.15 + speed * (history["time"] - 0.5 * self.step) - 0.5 * period
+            lever = place - period * np.round(place / period)
+            self.assertGreater(np.ptp(lever), 0.9 * period)
+            self.verify("grain on a floor of a period", "moment [N m]", history["moment_z:floor"], lever * history["force_y:floor"], 1e-9)
+
     def test_piston_that_moves_at_the_start(self):
         """A piston with a velocity at the start is slowed down by its force, and meets a grain that stops it: both go on together."""
         mass, force, speed = 1.3, 2.0, 0.4

@@ -406,7 +406,7 @@ class Regions(RunTestCase):
                 [{**box, "upper": [0.5, 0.1]}],
             "&region 'a': from 6.000E-01 m to 4.000E-01 m along x: expected a region with an inside": [{"name": "a", "lower": [0.6]}],
             "&region 'a': from 1.000E+12 m to 1.000E+12 m along x: expected a region with an inside, no longer than the period, 4.000E-01 m, "
-            "and near the cell": [{**box, "lower": [1e12, 0.0], "upper": [1e12 + 0.1, 1.0]}],
+            "and within two periods of the cell": [{**box, "lower": [1e12, 0.0], "upper": [1e12 + 0.1, 1.0]}],
         }
         for line, regions in lines.items():
             with self.subTest(line):

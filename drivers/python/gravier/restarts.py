@@ -25,6 +25,8 @@ def given_contacts(run, step=None):
     found = {"candidate": contacts.candidate, "antagonist": antagonist, "normal": contacts.normal, "force": forces.force, "point": point}
     if "moment" in forces:
         found["moment"] = forces.moment
+    if "elongation" in contacts:
+        found["elongation"] = contacts.elongation
     # what bears nothing starts from nothing
     bears = np.any(forces.force != 0.0, axis=1)
     return {name: values[bears] for name, values in found.items()}, list(boundaries.name)

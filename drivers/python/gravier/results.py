@@ -200,7 +200,7 @@ class Run:
 
     def contacts(self, step=None):
         """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s] and, where bodies have shapes, point (n, d), the place
-        of the contact; None where none are written."""
+        of the contact, and with tangential springs elongation (n, d); None where none are written."""
         return self._group(step, "contacts")
 
     def forces(self, step=None):

@@ -1,5 +1,5 @@
-!> Contacts of a bodies file in HDF5: /contacts/{candidate, antagonist, boundaries, normal, force, point, moment}. `antagonist` is
-!> the identifier of a body or, -k, the k-th of the names that `boundaries` lists, one a line.
+!> Contacts of a bodies file in HDF5: /contacts/{candidate, antagonist, boundaries, normal, force, point, moment, elongation}.
+!> `antagonist` is the identifier of a body or, -k, the k-th of the names that `boundaries` lists, one a line.
 module gravier_bodies_contacts
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -14,8 +14,8 @@ module gravier_bodies_contacts
   private
   public :: contact_sets, read_contacts, write_contacts, contact_words
 
-  character(len=*), parameter :: contact_sets(7) = [character(len=10) :: "candidate", "antagonist", "boundaries", "normal", &
-    & "force", "point", "moment"]
+  character(len=*), parameter :: contact_sets(8) = [character(len=10) :: "candidate", "antagonist", "boundaries", "normal", &
+    & "force", "point", "moment", "elongation"]
   character(len=*), parameter :: newline = new_line("a")
 
 contains
@@ -23,7 +23,7 @@ contains
   !> Words of a contact in a file, at most.
   pure integer function contact_words(dimension) result(words)
     integer, intent(in) :: dimension
-    words = 2 + 3*dimension + (2*dimension - 3)
+    words = 2 + 4*dimension + (2*dimension - 3)
   end function contact_words
 
   !> Read the rows of this rank, and check them. Failure: status_input, with file, dataset, row, and what was expected. Collective.
@@ -54,6 +54,10 @@ contains
       allocate (contacts%moment(2*dimension - 3, contacts%n), source=0.0_dp)
       call file%read_rows("/contacts/moment", contacts%first, contacts%moment, error)
     end if
+    if (file%exists("/contacts/elongation")) then
+      allocate (contacts%elongation(dimension, contacts%n), source=0.0_dp)
+      call file%read_rows("/contacts/elongation", contacts%first, contacts%elongation, error)
+    end if
     call check_given(comm, contacts, error)
   end subroutine read_contacts
 
@@ -70,7 +74,7 @@ contains
     do k = 1, size(contact_sets)
       if (contact_sets(k) == "boundaries") cycle
       associate (name => "/contacts/"//trim(contact_sets(k)))
-        if (contact_sets(k) == "point" .or. contact_sets(k) == "moment") then
+        if (any(contact_sets(k) == [character(len=10) :: "point", "moment", "elongation"])) then
           if (.not. file%exists(name)) cycle
         end if
         call file%row_count(name, rows, error)
@@ -147,13 +151,15 @@ contains
     integer(i8), allocatable :: records(:, :), ordered(:, :)
     integer(i8), allocatable :: id(:)
     real(dp), allocatable :: vectors(:, :)
-    integer :: k, nd, nm
+    integer :: k, nd, nm, ne
 
     if (allocated(error)) return
     nd = size(contacts%normal, 1)
     nm = 0
     if (allocated(contacts%moment)) nm = size(contacts%moment, 1)
-    allocate (records(3 + 3*nd + nm, contacts%n))
+    ne = 0
+    if (allocated(contacts%elongation)) ne = nd
+    allocate (records(3 + 3*nd + nm + ne, contacts%n))
     do k = 1, contacts%n
       records(1, k) = contacts%candidate(k)
       records(2, k) = contacts%antagonist(k)
@@ -163,6 +169,7 @@ contains
     call pack_reals(nd, contacts%force, 4 + nd, records)
     call pack_reals(nd, contacts%point, 4 + 2*nd, records)
     if (nm > 0) call pack_reals(nm, contacts%moment, 4 + 3*nd, records)
+    if (ne > 0) call pack_reals(ne, contacts%elongation, 4 + 3*nd + nm, records)
     call order_rows(comm, 3, records, ordered)
     call file%make_group("/contacts", error)
     id = ordered(1, :)
@@ -178,10 +185,16 @@ contains
     call unpack_reals(ordered, 4 + 2*nd, nd, vectors)
     call file%write_rows("/contacts/point", vectors, error)
     call file%write_attribute("/contacts/point", "unit", "m", error)
-    if (nm == 0) return
-    call unpack_reals(ordered, 4 + 3*nd, nm, vectors)
-    call file%write_rows("/contacts/moment", vectors, error)
-    call file%write_attribute("/contacts/moment", "unit", "N m", error)
+    if (nm > 0) then
+      call unpack_reals(ordered, 4 + 3*nd, nm, vectors)
+      call file%write_rows("/contacts/moment", vectors, error)
+      call file%write_attribute("/contacts/moment", "unit", "N m", error)
+    end if
+    if (ne > 0) then
+      call unpack_reals(ordered, 4 + 3*nd + nm, ne, vectors)
+      call file%write_rows("/contacts/elongation", vectors, error)
+      call file%write_attribute("/contacts/elongation", "unit", "m", error)
+    end if
   end subroutine write_contacts
 
   subroutine write_names(comm, file, names, error)

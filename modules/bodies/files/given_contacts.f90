@@ -42,6 +42,9 @@ module gravier_given_contacts
     !> 2D (1, n), 3D (3, n): of rolling and pivoting resistance, on the candidate, along the axes of space [N m]; not allocated
     !> where the file has none
     real(dp), allocatable :: moment(:, :)
+    !> (dimension, n): of the tangential spring, the way of the candidate against the antagonist along the axes of space [m]; not
+    !> allocated where the file has none
+    real(dp), allocatable :: elongation(:, :)
   end type given_contacts_t
 
 contains
@@ -61,6 +64,7 @@ contains
         call check_vector(contacts, "force", contacts%force(:, k), k, error)
         if (allocated(contacts%point)) call check_vector(contacts, "point", contacts%point(:, k), k, error)
         if (allocated(contacts%moment)) call check_vector(contacts, "moment", contacts%moment(:, k), k, error)
+        if (allocated(contacts%elongation)) call check_vector(contacts, "elongation", contacts%elongation(:, k), k, error)
         if (allocated(error)) exit
         if (.not. maxval(abs(contacts%normal(:, k))) > 0.0_dp) then
           call raise(error, status_input, row_text(contacts, "normal", k)//"zero, but a normal that is not zero was expected")

@@ -21,7 +21,8 @@ module gravier_neighbour_search
   type :: neighbour_search_t
     type(neighbour_rule_t) :: rule
     type(period_t) :: period
-    type(boundary_t), allocatable :: boundaries(:)
+    !> of the scene, which outlive the search
+    type(boundary_t), pointer :: boundaries(:) => null()
     !> whose pairs are listed
     integer :: subdomain = 0
     !> whether the subdomain is all of space

@@ -175,33 +175,75 @@ contains
       & vertex, place)
   end subroutine lay_out_feature
 
-  !> Leave out corners where a polygon turns inwards, as it may beside a corner of which one side only was lengthened.
+  !> Leave out corners where a polygon turns inwards, as it may beside a corner of which one side only was lengthened: what is left
+  !> are the corners of its convex hull, whatever corner the list begins with, and whichever way round it goes.
   pure subroutine drop_inner(sense, m, vertex, place)
     !> 1.0 for a polygon that is anticlockwise, -1.0 for one that is clockwise
     real(dp), intent(in) :: sense
     integer, intent(inout) :: m, vertex(:)
     real(dp), intent(inout) :: place(:, :)
-    real(dp) :: u(2), v(2)
-    integer :: k, kept
+    integer :: hull(m), n, k, number(m)
+    real(dp) :: at(3, m)
 
-    k = 1
-    kept = 0
-    do while (kept < m .and. m > 3)
-      u(:) = place(1:2, k) - place(1:2, mod(k + m - 2, m) + 1)
-      v(:) = place(1:2, mod(k, m) + 1) - place(1:2, k)
-      if (sense*(u(1)*v(2) - u(2)*v(1)) >= -inner*sqrt(dot_product(u, u)*dot_product(v, v))) then
-        kept = kept + 1
-        k = mod(k, m) + 1
-      else
-        vertex(k:m - 1) = vertex(k + 1:m)
-        place(:, k:m - 1) = place(:, k + 1:m)
-        m = m - 1
-        kept = 0
-        ! the corner before may now turn inwards
-        k = mod(k + m - 2, m) + 1
-      end if
+    if (.not. turns_inwards(sense, place(1:2, 1:m))) return
+    n = 0
+    do k = 1, m
+      if (next_on_hull(sense, place(1:2, 1:m), k) > 0) exit
     end do
+    do while (k <= m .and. n < m)
+      n = n + 1
+      hull(n) = k
+      k = next_on_hull(sense, place(1:2, 1:m), k)
+      if (k == 0 .or. k == hull(1)) exit
+    end do
+    if (n < 3) return
+    number(:) = vertex(1:m)
+    at(:, :) = place(:, 1:m)
+    do k = 1, n
+      vertex(k) = number(hull(k))
+      place(:, k) = at(:, hull(k))
+    end do
+    m = n
   end subroutine drop_inner
+
+  !> Whether some corner of a polygon turns inwards.
+  pure logical function turns_inwards(sense, place)
+    real(dp), intent(in) :: sense, place(:, :)
+    real(dp) :: u(2), v(2)
+    integer :: k, m
+
+    m = size(place, 2)
+    turns_inwards = .true.
+    do k = 1, m
+      u(:) = place(:, k) - place(:, mod(k + m - 2, m) + 1)
+      v(:) = place(:, mod(k, m) + 1) - place(:, k)
+      if (sense*(u(1)*v(2) - u(2)*v(1)) < -inner*sqrt(dot_product(u, u)*dot_product(v, v))) return
+    end do
+    turns_inwards = .false.
+  end function turns_inwards
+
+  !> The corner of the convex hull that follows corner `k`, the nearest of those in line; 0 where `k` is inside.
+  pure integer function next_on_hull(sense, place, k) result(next)
+    real(dp), intent(in) :: sense, place(:, :)
+    integer, intent(in) :: k
+    real(dp) :: u(2), v(2), length, nearest
+    integer :: i, j
+
+    next = 0
+    nearest = huge(1.0_dp)
+    do j = 1, size(place, 2)
+      u(:) = place(:, j) - place(:, k)
+      length = dot_product(u, u)
+      if (.not. length > 0.0_dp .or. length >= nearest) cycle
+      do i = 1, size(place, 2)
+        v(:) = place(:, i) - place(:, k)
+        if (sense*(u(1)*v(2) - u(2)*v(1)) < -inner*sqrt(length*dot_product(v, v))) exit
+      end do
+      if (i <= size(place, 2)) cycle
+      next = j
+      nearest = length
+    end do
+  end function next_on_hull
 
   !> Move a corner of a face towards its sharp place: within the face where both of its sides lie in the plane of contact, along a
   !> side where only that one does.

@@ -12,6 +12,7 @@ module gravier_halo
   use gravier_cell_order, only: sweep_order
   use gravier_neighbour_search, only: neighbour_search_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_list_reference, only: reference_t, note_bodies, note_boundaries, way_of
   implicit none
   private
   public :: local_bodies_t, halo_t, mask_t
@@ -29,11 +30,6 @@ module gravier_halo
     !> the cell as it is, for the velocities of images; set where it moves
     type(period_t) :: period
   end type local_bodies_t
-
-  !> The grains of a subdomain when its list was made: their places (nd, n) [m] and speeds (n) [m/s].
-  type :: reference_t
-    real(dp), allocatable :: position(:, :), speed(:)
-  end type reference_t
 
   !> One of each body of a set, of those that stay.
   type :: mask_t
@@ -76,7 +72,7 @@ contains
   !> Make the local bodies and lists from the grains as they have migrated. Collective.
   subroutine halo_build(self, decomposition, least_extent)
     class(halo_t), intent(inout) :: self
-    type(decomposition_t), intent(in) :: decomposition
+    type(decomposition_t), intent(in), target :: decomposition
     !> largest extent of bodies that were there when the lists were first made, and have left since [m]
     real(dp), intent(in), optional :: least_extent
     type(body_set_t), allocatable :: ghosts(:)
@@ -100,17 +96,17 @@ contains
     call make_views(self, decomposition, ghosts, received)
     search%period = decomposition%period
     search%is_alone = decomposition%n_subdomains == 1
-    search%boundaries = decomposition%boundaries
+    search%boundaries => decomposition%boundaries
     search%counts = decomposition%shapes%counts
     do s = 1, size(self%view)
-      call note_reference(decomposition%owned(s), self%reference(s))
+      call note_bodies(decomposition%owned(s), self%reference(s))
       associate (view => self%view(s))
         search%subdomain = decomposition%subdomain_of(s)
         view%period = decomposition%period
         call search%find(view%bodies, view%owner, decomposition%partition, self%memory, view%list)
       end associate
     end do
-    self%reference_boundaries = decomposition%boundaries
+    call note_boundaries(decomposition%boundaries, self%reference_boundaries)
     self%reference_period = decomposition%period
     self%builds = self%builds + 1
   end subroutine halo_build
@@ -150,19 +146,6 @@ contains
     end do
     rule%largest_extent = decomposition%comm%highest(rule%largest_extent)
   end subroutine find_largest_extent
-
-  !> Keep what tells later whether the lists are still valid.
-  subroutine note_reference(owned, reference)
-    type(body_set_t), intent(in) :: owned
-    type(reference_t), intent(out) :: reference
-    integer :: k
-
-    reference%position = owned%position
-    allocate (reference%speed(owned%n))
-    do k = 1, owned%n
-      reference%speed(k) = norm2(owned%velocity(1:owned%nd, k))
-    end do
-  end subroutine note_reference
 
   !> Find the grains of this rank that other subdomains see.
   subroutine plan_ghosts(self, decomposition, rule)
@@ -467,23 +450,6 @@ contains
       end do
     end associate
   end function halo_are_due
-
-  !> How far the surface of a boundary has moved at most [m]. The axis of a drum, which turns about it, picks up roundings,
-  !> which are no tilt.
-  pure real(dp) function way_of(now, before) result(way)
-    type(boundary_t), intent(in) :: now, before
-    !> [rad]
-    real(dp), parameter :: tilt_of_roundings = 1.0e-11_dp
-
-    way = 0.0_dp
-    if (.not. now%touches()) return
-    if (norm2(now%surface%axis - before%surface%axis) > tilt_of_roundings) then
-      ! a plane or a cylinder that tilts moves without bound
-      way = huge(1.0_dp)
-    else
-      way = now%surface%way(before%surface)
-    end if
-  end function way_of
 
   !> Give all local bodies an applied force, of 0, where there are any yet.
   subroutine halo_take_forces(self)

@@ -75,7 +75,7 @@ contains
     divisor(n_low + 1:) = high(n_high:1:-1)
   end subroutine list_divisors
 
-  !> Refuse more subdomains than detection cells; cheap, whatever their number. Failure: status_input.
+  !> Refuse the scene is too small for so many subdomains; cheap, whatever their number. Failure: status_input.
   subroutine check_subdomains(lower, upper, edge, n_subdomains, error)
     !> (nd) [m]
     real(dp), intent(in) :: lower(:), upper(:)
@@ -100,7 +100,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     if (n_subdomains > n_cells) call raise(error, status_input, "&decomposition subdomains = "//to_text(n_subdomains)// &
-      & ": more subdomains than detection cells; expected at most "//to_text(n_cells)//" for this scene")
+      & ": the scene is too small for so many subdomains; expected at most "//to_text(n_cells)//" for this scene")
   end subroutine refuse_too_many
 
 end module gravier_box_counts

@@ -14,7 +14,7 @@ module gravier_contact_springs
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: pack_spring, stretch_spring, conclude_springs, measure_springs, spring_energies
+  public :: pack_spring, stretch_spring, conclude_springs, measure_springs, spring_energies, find_elongation, put_elongation
 
 contains
 
@@ -113,6 +113,42 @@ contains
       end if
     end associate
   end function kept_elongation
+
+  !> Elongation that the pair of contact `c` keeps, along the axes of space: the way of the candidate against the antagonist [m].
+  pure subroutine find_elongation(list, sub, c, elongation)
+    type(neighbour_list_t), intent(in) :: list
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    !> (nd)
+    real(dp), intent(out) :: elongation(:)
+
+    associate (kept => list%spring(:, sub%source(c)), n => sub%hot(lane_of(c), 1:size(elongation), block_of(c)))
+      if (size(elongation) == 2) then
+        elongation(1) = -n(2)*kept(1)
+        elongation(2) = n(1)*kept(1)
+      else
+        elongation(:) = kept
+      end if
+    end associate
+  end subroutine find_elongation
+
+  !> Let the pair of contact `c` keep an elongation along the axes of space [m], without its part along a normal, which need not be
+  !> that of now: like what is kept from step to step, it turns with the contact.
+  pure subroutine put_elongation(list, sub, c, normal, elongation)
+    type(neighbour_list_t), intent(inout) :: list
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    !> (nd)
+    real(dp), intent(in) :: normal(:), elongation(:)
+
+    associate (kept => list%spring(:, sub%source(c)))
+      if (size(elongation) == 2) then
+        kept(1) = normal(1)*elongation(2) - normal(2)*elongation(1)
+      else
+        kept(:) = elongation - sum(elongation*normal)*normal
+      end if
+    end associate
+  end subroutine put_elongation
 
   !> Keep the elongations of the springs of a solved problem with the pairs of the lists, as they are at the q_m of the next step;
   !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its

@@ -219,9 +219,10 @@ contains
   end subroutine drop
 
   !> Bring the impulses, elongations and states that the pair at place `p` keeps to the points of now: to those with the same keys
-  !> first. What is left goes to the new points, in its order where they are as many. Otherwise the deepest of them takes what bore
-  !> most, and so on: where a point becomes two, the one that stays is the deeper one, whatever the order of the keys. Points take
-  !> the places of the pair in their order.
+  !> first. What is left goes to the new points, in its order where they are as many and all of it is alike: loaded or not, with a
+  !> state of the law or without. Otherwise the deepest of them takes what bore most, and so on: where a point becomes two, the one
+  !> that stays is the deeper one, whatever the order of the keys, and a polygon that rolls over a corner keeps what this corner
+  !> held though both its points have new keys. Points take the places of the pair in their order.
   pure subroutine carry_memory(points, p, list)
     type(pair_points_t), intent(in) :: points
     integer, intent(in) :: p
@@ -229,6 +230,7 @@ contains
     integer :: source(points%n)
     real(dp), allocatable :: impulse(:, :), spring(:, :), load(:)
     integer, allocatable :: state(:, :)
+    logical, allocatable :: has_state(:)
     integer :: k, m, row
 
     m = list%points_of(p)
@@ -243,7 +245,11 @@ contains
     else
       load = norm2(spring, dim=1)
     end if
-    call find_sources(points, state(row:row + 1, :), load, source)
+    allocate (has_state(m))
+    do k = 1, m
+      has_state(k) = any(state(1:row - 1, k) /= 0)
+    end do
+    call find_sources(points, state(row:row + 1, :), has_state, load, source)
     list%impulse(:, p:p + m - 1) = 0.0_dp
     list%spring(:, p:p + m - 1) = 0.0_dp
     list%state(:, p:p + m - 1) = 0
@@ -275,15 +281,17 @@ contains
   end subroutine carry_memory
 
   !> The place among what a pair keeps that each point takes from, 0 where nothing is left for it.
-  pure subroutine find_sources(points, key, load, source)
+  pure subroutine find_sources(points, key, has_state, load, source)
     type(pair_points_t), intent(in) :: points
     !> keys of what is kept (2, m), the first 0 where nothing is
     integer, intent(in) :: key(:, :)
+    !> whether its law has a state, such as a bond, which counts more than any load (m)
+    logical, intent(in) :: has_state(:)
     !> its normal impulse [N s] or, where none are kept, the length of its elongation [m] (m)
     real(dp), intent(in) :: load(:)
     !> (points)
     integer, intent(out) :: source(:)
-    logical :: taken(size(load)), as_many
+    logical :: taken(size(load)), loaded(size(load)), as_many
     integer :: k, l
 
     source(:) = 0
@@ -298,6 +306,8 @@ contains
       end do
     end do
     as_many = count(source == 0) == count(.not. taken)
+    loaded(:) = load > 0.0_dp
+    if (as_many) as_many = are_alike(has_state) .and. are_alike(loaded)
     do
       k = deepest_new()
       l = heaviest_left()
@@ -307,6 +317,12 @@ contains
     end do
 
   contains
+
+    !> Whether all that is left has the same answer.
+    pure logical function are_alike(answer)
+      logical, intent(in) :: answer(:)
+      are_alike = all(answer .or. taken) .or. .not. any(answer .and. .not. taken)
+    end function are_alike
 
     !> The deepest point without a source, the first of those as deep; 0 where all have one.
     pure integer function deepest_new() result(found)
@@ -331,7 +347,8 @@ contains
       do l = 1, size(load)
         if (taken(l)) cycle
         if (found > 0) then
-          if (as_many .or. load(l) <= load(found)) cycle
+          if (as_many .or. (has_state(found) .and. .not. has_state(l))) cycle
+          if ((has_state(found) .eqv. has_state(l)) .and. load(l) <= load(found)) cycle
         end if
         found = l
       end do

@@ -110,6 +110,7 @@ contains
     real(dp), intent(in) :: pivot(3)
     real(dp), intent(out) :: moment(3)
     real(dp) :: p(3), place(3), arm(3), rolling(lanes, 3)
+    integer :: d
 
     p(:) = 0.0_dp
     place(:) = 0.0_dp
@@ -121,6 +122,12 @@ contains
         & place(1:nd) = place(1:nd) - 0.5_dp*sub%gap(c)*sub%hot(q, 1:nd, g)
       call boundary%find_image(place(1:nd), arm)
       arm(:) = arm - pivot
+      ! planes have no middle that an image could be near to: it is the pivot
+      if (boundary%is_plane()) then
+        do d = 1, nd
+          if (boundary%period(d) > 0.0_dp) arm(d) = arm(d) - boundary%period(d)*anint(arm(d)/boundary%period(d))
+        end do
+      end if
       moment(:) = cross(arm, p)
       if (row%rolling_radius == 0) return
       if (nd == 2) then

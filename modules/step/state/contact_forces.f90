@@ -7,6 +7,7 @@ module gravier_contact_forces
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_contact_places, only: find_contact_place
+  use gravier_contact_springs, only: find_elongation
   implicit none
   private
   public :: list_forces
@@ -37,6 +38,7 @@ contains
       contacts%total = problem%comm%total(int(n, i8))
       allocate (contacts%candidate(n), contacts%antagonist(n), contacts%normal(nd, n), contacts%force(nd, n), contacts%point(nd, n))
       if (problem%kernels%row%rolling_radius > 0) allocate (contacts%moment(2*nd - 3, n))
+      if (halo%memory%n_spring > 0) allocate (contacts%elongation(nd, n))
       allocate (contacts%boundary(size(boundaries)))
       do b = 1, size(boundaries)
         contacts%boundary(b) = boundaries(b)%name
@@ -57,6 +59,7 @@ contains
             call problem%impulse_on_candidate(s, c, contacts%force(:, n))
             contacts%force(:, n) = contacts%force(:, n)/h
             call find_contact_place(problem%kernels, view, sub, c, contacts%point(:, n))
+            if (allocated(contacts%elongation)) call find_elongation(view%list, sub, c, contacts%elongation(:, n))
             if (.not. allocated(contacts%moment)) cycle
             call global_moment(problem%kernels, sub%hot, sub%impulse, c, contacts%moment(:, n))
             contacts%moment(:, n) = contacts%moment(:, n)/h

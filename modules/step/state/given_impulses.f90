@@ -1,6 +1,6 @@
 !> The impulses that the first solve of a run starts from, where its bodies file gives forces of contacts. They enter the memory
 !> that carries impulses from step to step, so that nothing else knows where they come from. The tangential springs of contacts that
-!> yield are stretched so far that they carry the tangential forces.
+!> yield have the elongations given, or else are stretched so far that they carry the tangential forces.
 !>
 !> A given contact belongs to the contact of the first step that has the same two bodies or the same body and boundary and a normal
 !> within a right angle of its own; of several the nearest one. Rank `mod(candidate, ranks)` brings the two together: it is told of
@@ -20,7 +20,7 @@ module gravier_given_impulses
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_physics, only: physics_t
-  use gravier_contact_springs, only: stretch_spring
+  use gravier_contact_springs, only: stretch_spring, put_elongation
   use gravier_contact_places, only: find_contact_place
   implicit none
   private
@@ -35,7 +35,9 @@ module gravier_given_impulses
   end type started_t
 
   !> words of a record before its numbers: candidate, antagonist, subdomain of its rank, row; numbers in space
-  integer, parameter :: n_words = 4, n_numbers = 12
+  integer, parameter :: n_words = 4, n_numbers = 15
+  !> in the place of an elongation that is not given [m]
+  real(dp), parameter :: not_given = huge(1.0_dp)
 
 contains
 
@@ -71,8 +73,8 @@ contains
   end subroutine take_given_impulses
 
   !> The given contacts of this rank as records: candidate, antagonist (minus the number of a boundary of the scene), 0, row,
-  !> normal, force, point and moment. Of two bodies the candidate is that of the lower identifier. Boundaries that the scene does
-  !> not have are left out.
+  !> normal, force, point, moment and elongation. Of two bodies the candidate is that of the lower identifier. Boundaries that the
+  !> scene does not have are left out.
   subroutine pack_given(given, boundaries, records)
     type(given_contacts_t), intent(in) :: given
     type(boundary_t), intent(in) :: boundaries(:)
@@ -111,6 +113,8 @@ contains
       numbers(4:3 + nd, 1) = merge(-given%force(:, k), given%force(:, k), turned)
       if (allocated(given%point)) numbers(7:6 + nd, 1) = given%point(:, k)
       if (allocated(given%moment)) numbers(10:9 + size(given%moment, 1), 1) = merge(-given%moment(:, k), given%moment(:, k), turned)
+      numbers(13, 1) = not_given
+      if (allocated(given%elongation)) numbers(13:12 + nd, 1) = merge(-given%elongation(:, k), given%elongation(:, k), turned)
       call pack_reals(n_numbers, numbers, n_words + 1, packed(:, n:n))
     end do
     records = packed(:, 1:n)
@@ -227,7 +231,15 @@ contains
       call find_nearest(decomposition, problem, halo, pairs, first_not_before(pairs, order, records(1:3, k)), numbers, c)
       if (c == 0) cycle
       pressing(k) = abs(sum(numbers(1:3)*numbers(4:6)))
-      if (problem%sub(s)%yields(c)) call elongate(problem%sub(s), c, numbers(1:6), halo%view(s)%list)
+      if (problem%sub(s)%yields(c)) then
+        if (numbers(13) < not_given) then
+          associate (nd => problem%kernels%nd)
+            call put_elongation(halo%view(s)%list, problem%sub(s), c, numbers(1:nd), numbers(13:12 + nd))
+          end associate
+        else
+          call elongate(problem%sub(s), c, numbers(1:6), halo%view(s)%list)
+        end if
+      end if
       numbers(4:6) = physics%h*numbers(4:6)
       numbers(10:12) = physics%h*numbers(10:12)
       call add_impulse(problem%kernels, problem%sub(s), c, numbers, halo%view(s)%list)

@@ -22,9 +22,10 @@ program test_io_bodies_contacts
   call get_environment_variable("GRAVIER_TEST_DIR", directory, status=stat)
   if (stat /= 0) directory = "."
   path = trim(directory)//"/io_bodies_contacts_"//to_text(comm%size)//".h5"
-  call test_round_trip(2, .true.)
-  call test_round_trip(3, .true.)
-  call test_round_trip(3, .false.)
+  call test_round_trip(2, .true., .true.)
+  call test_round_trip(3, .true., .false.)
+  call test_round_trip(3, .false., .true.)
+  call test_round_trip(3, .false., .false.)
   call test_checks()
   call finish_checks()
   call comm%free()
@@ -41,9 +42,9 @@ contains
   end function number_of
 
   !> Each rank makes those of some bodies, the last ones first.
-  subroutine make(nd, with_moment, contacts)
+  subroutine make(nd, with_moment, with_elongation, contacts)
     integer, intent(in) :: nd
-    logical, intent(in) :: with_moment
+    logical, intent(in) :: with_moment, with_elongation
     type(given_contacts_t), intent(out) :: contacts
     !> candidate, antagonist, place among those of the pair
     integer(i8) :: a, row(3, 3*n_bodies)
@@ -68,6 +69,7 @@ contains
     contacts%boundary(2) = "wall"
     allocate (contacts%normal(nd, n), contacts%force(nd, n), contacts%point(nd, n))
     if (with_moment) allocate (contacts%moment(2*nd - 3, n))
+    if (with_elongation) allocate (contacts%elongation(nd, n))
     do k = 1, n
       a = number_of(row(1, k), row(2, k), int(row(3, k)))
       do d = 1, nd
@@ -79,14 +81,17 @@ contains
       do d = 1, merge(2*nd - 3, 0, with_moment)
         contacts%moment(d, k) = hash_uniform(4, a, d)
       end do
+      do d = 1, merge(nd, 0, with_elongation)
+        contacts%elongation(d, k) = hash_uniform(5, a, d)
+      end do
     end do
   end subroutine make
 
   !> What is read are the same contacts in the order of candidate, antagonist and place, in blocks by rank. A normal that was a unit
   !> vector is one to two roundings.
-  subroutine test_round_trip(nd, with_moment)
+  subroutine test_round_trip(nd, with_moment, with_elongation)
     integer, intent(in) :: nd
-    logical, intent(in) :: with_moment
+    logical, intent(in) :: with_moment, with_elongation
     type(given_contacts_t) :: contacts, back
     type(h5_file_t) :: file
     type(error_t), allocatable :: error
@@ -94,7 +99,7 @@ contains
     integer :: k, d, place
     logical :: same, sorted
 
-    call make(nd, with_moment, contacts)
+    call make(nd, with_moment, with_elongation, contacts)
     call file%create(comm, path, error)
     call file%reserve(65536_i8 + 8*contacts%total*contact_words(nd), error)
     call write_contacts(comm, file, contacts, error)
@@ -111,6 +116,7 @@ contains
     call check(all(back%boundary == contacts%boundary), "names of boundaries")
     call check(allocated(back%point), "places")
     call check(allocated(back%moment) .eqv. with_moment, "moments")
+    call check(allocated(back%elongation) .eqv. with_elongation, "elongations")
     same = .true.
     sorted = .true.
     last(:) = 0
@@ -127,6 +133,7 @@ contains
       do d = 1, nd
         same = same .and. abs(back%force(d, k) - hash_uniform(2, a, d)) <= 0.0_dp
         same = same .and. abs(back%point(d, k) - hash_uniform(3, a, d)) <= 0.0_dp
+        if (with_elongation) same = same .and. abs(back%elongation(d, k) - hash_uniform(5, a, d)) <= 0.0_dp
         if (with_moment .and. d <= 2*nd - 3) same = same .and. abs(back%moment(d, k) - hash_uniform(4, a, d)) <= 0.0_dp
       end do
       same = same .and. abs(norm2(back%normal(:, k)) - 1.0_dp) <= 2*epsilon(1.0_dp)
@@ -147,7 +154,7 @@ contains
       ids(1, k) = comm%rank + 1 + (k - 1)*comm%size
     end do
     id = ids(1, :)
-    call make(2, .false., contacts)
+    call make(2, .false., .false., contacts)
     contacts%path = "file"
     call find_ranks(comm, ids, rank)
     call check(all(rank >= 0 .and. rank < comm%size), "ranks that know of bodies")

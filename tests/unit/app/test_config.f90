@@ -761,7 +761,7 @@ contains
     character(len=:), allocatable :: key
     key = assignment(:index(assignment, " ") - 1)
     call refuse(scene("bodies = '" // bodies // "' " // keys // " " // assignment, groups), "&scene " // assignment // ": " &
-      // key // " belongs to bodies = " // owners // ", expected without it where bodies = '" // bodies // "'")
+      // key // " belongs to bodies = " // owners // "; expected none where bodies = '" // bodies // "'")
   end subroutine refuse_stranger
 
   subroutine test_rules_of_lattice()
@@ -839,9 +839,9 @@ contains
     call refuse(column // "&solver method = 'schwarz' relaxation = 1.5 /", &
       "&solver relaxation = 1.5: expected a finite real number in (0, 1]")
     call refuse(column // "&solver relaxation = 0.5 /", "&solver relaxation = 0.5: relaxation belongs to method = 'schwarz' or " &
-      // "'schwarz_ec', expected without it where method = 'nlgs'")
+      // "'schwarz_ec'; expected none where method = 'nlgs'")
     call refuse(scene("bodies = 'column' gravity_table = 'g.csv' gravity = 0, -1"), &
-      "&scene gravity = 0, -1: expected a scene without it where gravity_table = 'g.csv' replaces it")
+      "&scene gravity = 0, -1: expected none where gravity_table = 'g.csv' replaces it")
     call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
     call refuse(column // "&solver velocity_scale = 0 /", "&solver velocity_scale = 0: " // positive // " (m/s)")
   end subroutine test_rules_of_time_and_solver
@@ -1096,7 +1096,7 @@ contains
     character(len=*), intent(in) :: assignment, owners
     call refuse(column // "&boundary shape = '" // shape // "' " // keys // " " // assignment // " /", &
       "&boundary (the 1st) " // assignment // ": " // assignment(:scan(assignment, " (") - 1) // " belongs to shape = " &
-      // owners // ", expected without it where shape = '" // shape // "'")
+      // owners // "; expected none where shape = '" // shape // "'")
   end subroutine refuse_foreign
 
   subroutine test_rules_of_boundary()
@@ -1160,7 +1160,7 @@ contains
     call accept(plane // "free = 3*F force = 3*0 pressure = 0 rotation = 1 /", "a plane whose loads are 0", config)
     call refuse(plane // "free = T /", first // "mass is missing: " // positive // " (kg), required by free = T")
     call refuse(plane // "free = T mass = 0 /", first // "mass = 0: " // positive // " (kg)")
-    call refuse(plane // "mass = 1 /", first // "mass = 1: expected a boundary without it where no component is free")
+    call refuse(plane // "mass = 1 /", first // "mass = 1: expected none where no component is free")
     call refuse(plane // "free = T mass = 1 rotation = 1 /", &
       first // "rotation = 1: expected 0 where a component of the translation is free")
     call refuse(plane // "free = T mass = 1 force = 1, 1 /", &
@@ -1249,7 +1249,7 @@ contains
     character(len=*), parameter :: bounded = "'uniform', 'uniform_volume' or 'log_normal'"
 
     call refuse(column // "&sample count = 1 radius = 1 /", &
-      "group &sample belongs to bodies = 'sample', expected without it where bodies = 'column'")
+      "group &sample belongs to bodies = 'sample'; expected none where bodies = 'column'")
     call refuse("&scene bodies = 'sample' /" // time, &
       "group &sample is missing: expected &sample ... /, required by bodies = 'sample'")
     call refuse(sample("count = 1 radius = 1 box = 1") // "&sample /", &
@@ -1280,7 +1280,7 @@ contains
     call refuse_extra("preparation", "none", "max_steps = 1", "'settled' or 'compacted'")
     call refuse_extra("arrangement", "lattice", "solid_fraction = 0.5", "'loose'")
     call refuse(sample("count = 1 box = 1 radii = 'uniform' radius_min = 1 radius_max = 1 radius = 1"), &
-      "&sample radius = 1: radius belongs to radii = 'single', expected without it where radii = 'uniform'")
+      "&sample radius = 1: radius belongs to radii = 'single'; expected none where radii = 'uniform'")
     call refuse_stranger("sample", "", "seed = 1", "'lattice'", "&sample count = 1 radius = 1 box = 1 /")
   end subroutine test_keys_of_sample
 
@@ -1291,7 +1291,7 @@ contains
     character(len=*), intent(in) :: assignment, owners
     call refuse(sample("count = 1 box = 1 radius = 1 " // choice // " = '" // word // "' " // assignment), &
       "&sample " // assignment // ": " // assignment(:index(assignment, " ") - 1) // " belongs to " // choice // " = " &
-      // owners // ", expected without it where " // choice // " = '" // word // "'")
+      // owners // "; expected none where " // choice // " = '" // word // "'")
   end subroutine refuse_extra
 
   subroutine test_rules_of_sample()
@@ -1383,9 +1383,9 @@ contains
     call refuse(sample(grains // "box = 1, 1", "period = 0, 2"), &
       "&sample box = 1, 1: expected the same sizes as &scene period = 0, 2 along each axis that is periodic")
     call refuse(sample(grains // "box = 1, 1 solid_fraction = 0.5"), &
-      "&sample solid_fraction = 0.5: expected a sample without it where the last size of the box is given")
+      "&sample solid_fraction = 0.5: expected none where the last size of the box is given")
     call refuse(sample(grains // "box = 1 solid_fraction = 0.5", "period(2) = 1"), &
-      "&sample solid_fraction = 0.5: expected a sample without it where the last size of the box is given")
+      "&sample solid_fraction = 0.5: expected none where the last size of the box is given")
   end subroutine test_rules_of_box
 
   !> The options in force are those that count: none of another kind of bodies.
@@ -1471,7 +1471,7 @@ contains
     call refuse(two // coulomb // "&law materials = 'b', 'a' kind = 'frictionless' /", &
       "&law (the 2nd) materials = 'b', 'a': expected a pair of its own, but the 1st has it too")
     call refuse(two // "&law materials = 'a' kind = 'coulomb' adhesion = 1 /", &
-      "&law (the 1st) adhesion = 1: adhesion belongs to kind = 'adhesive', expected without it where kind = 'coulomb'")
+      "&law (the 1st) adhesion = 1: adhesion belongs to kind = 'adhesive'; expected none where kind = 'coulomb'")
     call refuse(two // "&law materials = 'a' kind = 'adhesive' adhesion = 1 /", &
       "&law (the 1st) adhesion_range is missing: expected a finite real number > 0 (m), required by kind = 'adhesive'")
     call refuse(two // "&law materials = 'a' kind = 'coulomb' restitution = 2 /", &

@@ -170,9 +170,9 @@ contains
   end subroutine find_homes
 
   !> Two planes, one of them with grains behind it.
-  function two_planes(nd) result(boundaries)
+  subroutine make_two_planes(nd, boundaries)
     integer, intent(in) :: nd
-    type(boundary_t) :: boundaries(2)
+    type(boundary_t), intent(out) :: boundaries(2)
     real(dp) :: normal(nd), point(nd)
 
     normal(:) = 0.0_dp
@@ -183,7 +183,7 @@ contains
     normal(nd) = 0.8_dp
     point(1) = 0.3_dp
     boundaries(2) = plane(1002, point, normal)
-  end function two_planes
+  end subroutine make_two_planes
 
   !> Pairs of all subdomains against all pairs.
   subroutine compare(cloud, bodies, rule, region)
@@ -192,13 +192,13 @@ contains
     type(neighbour_rule_t), intent(in) :: rule
     type(sites_t), intent(in) :: region
     type(neighbour_list_t) :: list
-    type(boundary_t) :: boundaries(2)
+    type(boundary_t), target :: boundaries(2)
     !> subdomain of each pair found, and of each grain near a boundary; -1 where it was found twice
     integer, allocatable :: found(:, :, :), near(:, :), owned(:)
     integer :: s, p, i, j
     logical :: right, ordered
 
-    boundaries(:) = two_planes(cloud%nd)
+    call make_two_planes(cloud%nd, boundaries)
     call find_homes(bodies, region, owned)
     allocate (found(cloud%n, cloud%n, 0:124), near(cloud%n, 2), source=0)
     right = .true.
@@ -335,12 +335,12 @@ contains
     type(sites_t), intent(in) :: region
     type(body_set_t) :: bodies(2)
     type(neighbour_list_t) :: list(2)
-    type(boundary_t) :: boundaries(2)
+    type(boundary_t), target :: boundaries(2)
     integer, allocatable :: owned(:)
     integer :: s, k, p
     logical :: same
 
-    boundaries(:) = two_planes(cloud%nd)
+    call make_two_planes(cloud%nd, boundaries)
     same = .true.
     do s = 1, size(region%site, 2)
       do k = 1, 2
@@ -447,7 +447,7 @@ contains
   !> Pairs of unit grains and boundaries with a range of 1/2.
   subroutine list_units(bodies, boundaries, period, list)
     type(body_set_t), intent(in) :: bodies
-    type(boundary_t), intent(in) :: boundaries(:)
+    type(boundary_t), intent(in), target :: boundaries(:)
     type(period_t), intent(in) :: period
     type(neighbour_list_t), intent(inout) :: list
     type(neighbour_rule_t) :: rule
@@ -563,7 +563,7 @@ contains
     type(neighbour_list_t) :: list
     type(neighbour_rule_t) :: point_like
     type(period_t) :: period
-    type(boundary_t) :: ground(1)
+    type(boundary_t), target :: ground(1)
     type(sites_t) :: whole
     real(dp) :: x(2, 1)
     integer, parameter :: owned(2) = 1

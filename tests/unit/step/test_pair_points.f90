@@ -196,6 +196,38 @@ contains
     call carry_memory(points, 1, list)
     call check_close(list%impulse(1, 1), 10.0_dp, 0.0_dp, "the first new point takes the first lost one's")
     call check(list%state(2, 1) == 6 .and. list%state(3, 1) == 2*feature_base + 1, "the keys are those of now")
+    ! a polygon rolls over the corner that bears it: both points have new keys, and the other one is in the air before and behind
+    call keep(list, 1, 0.0_dp, 0)
+    call keep(list, 2, 10.0_dp, 0)
+    points%n = 0
+    call points%add(manifold_of([1.0_dp, 2.0_dp], [0.0_dp, 0.1_dp], [6, 10]), 2, 1)
+    call carry_memory(points, 1, list)
+    call check_close(list%impulse(1, 1), 10.0_dp, 0.0_dp, "the corner that bears keeps what it held")
+    call check_close(list%impulse(1, 2), 0.0_dp, 0.0_dp, "the next one has nothing")
+    ! a bond without a load goes to the corner that touches, too, and before a load
+    call keep(list, 1, 10.0_dp, 0)
+    call keep(list, 2, 0.0_dp, 1)
+    points%n = 0
+    call points%add(manifold_of([1.0_dp, 2.0_dp], [0.0_dp, 0.1_dp], [7, 11]), 2, 1)
+    call carry_memory(points, 1, list)
+    call check(list%state(1, 1) == 1 .and. list%state(1, 2) == 0, "a bond stays at the corner that touches, beside a load")
+    call keep(list, 1, 0.0_dp, 0)
+    call keep(list, 2, 0.0_dp, 1)
+    points%n = 0
+    call points%add(manifold_of([1.0_dp, 2.0_dp], [0.0_dp, 0.1_dp], [8, 12]), 2, 1)
+    call carry_memory(points, 1, list)
+    call check(list%state(1, 1) == 1 .and. list%state(1, 2) == 0, "a bond without a load, too")
+    call keep(list, 2, 5.0_dp, 1)
+    points%n = 0
+    call points%add(manifold_of([1.0_dp, 2.0_dp], [0.1_dp, 0.0_dp], [9, 13]), 2, 1)
+    call carry_memory(points, 1, list)
+    call check_close(list%impulse(1, 2), 5.0_dp, 0.0_dp, "what is alike but for a load: the deeper one takes the load")
+    call keep(list, 1, 10.0_dp, 0)
+    call keep(list, 2, 0.0_dp, 1)
+    points%n = 0
+    call points%add(manifold_of([1.0_dp], [0.0_dp], [15]), 2, 1)
+    call carry_memory(points, 1, list)
+    call check(list%state(1, 1) == 1, "of two that held something the bond stays")
   end subroutine test_new_keys
 
   !> Other pairs of the list are left alone.
