@@ -127,6 +127,7 @@ contains
     if (.not. cell_moves(config%scene)) call stop_cell(scene%period, scene%grains)
     call check_moments(config, scene%effects, error)
     call check_shapes(config, scene, error)
+    if (scene%effects%compliance) call scene%shapes%keep_round()
     call check_places(comm, config, data, scene, error)
     if (config%solver%warm_start) scene%contacts = data%contacts
     if (.not. scene%laws%attracts) call check_pulls(comm, scene%contacts, error)

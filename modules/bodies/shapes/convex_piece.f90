@@ -20,6 +20,8 @@ module gravier_convex_piece
     !> where the core has no sides: one vertex or two. A corner where more than three faces meet may be behind several vertices, one
     !> after the other: they are one point where another body touches them
     real(dp), allocatable :: corner(:, :)
+    !> whether a side, a face or an edge that lies in the plane of contact reaches out to the sharp corners
+    logical :: reaches_out = .true.
     !> in 3D, faces of the core: vertices face_vertex(face_first(f):face_first(f + 1) - 1) of face f, anticlockwise seen from
     !> outside (faces + 1), unit normals to the outside (3, faces); all 0 in size where the core has no volume
     integer, allocatable :: face_first(:), face_vertex(:)

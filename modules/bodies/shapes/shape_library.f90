@@ -51,9 +51,24 @@ module gravier_shape_library
     procedure :: add => shape_library_add
     procedure :: find => shape_library_find
     procedure :: inertia => shape_library_inertia
+    procedure :: keep_round => shape_library_keep_round
   end type shape_library_t
 
 contains
+
+  !> Let flat sides end where their round corners begin, whatever they lie on. Springs of contacts need it: a point of contact that
+  !> goes from a round corner out to a sharp one as a side turns changes the gap though no body moves there, and gives energy or
+  !> takes it.
+  pure subroutine shape_library_keep_round(self)
+    class(shape_library_t), intent(inout) :: self
+    integer :: k, p
+
+    do k = 1, self%n
+      do p = 1, size(self%shape(k)%piece)
+        self%shape(k)%piece(p)%reaches_out = .false.
+      end do
+    end do
+  end subroutine shape_library_keep_round
 
   !> Largest principal moment of inertia of a body [kg m^2].
   pure real(dp) function shape_library_inertia(self, number, dimension, radius, mass) result(inertia)

@@ -5,7 +5,7 @@ module gravier_contact_feature
   implicit none
   private
   public :: placement_t, feature_t, frame_t
-  public :: find_feature, lay_out_feature, edge_number, face_number, turn_back
+  public :: find_feature, lay_out_feature, drop_inner, edge_number, face_number, turn_back
 
   !> Where a piece is: its lengths times a radius, its axes as columns, its centre [m].
   type :: placement_t
@@ -158,7 +158,7 @@ contains
     do k = 1, m
       x(:) = piece%vertex(:, vertex(k))
       last = mod(k + m - 2, m) + 1
-      if (min(side(last)%sine, side(k)%sine) < blend_angle) then
+      if (piece%reaches_out .and. min(side(last)%sine, side(k)%sine) < blend_angle) then
         if (feature%face > 0) then
           call blend_in_face(piece, feature%face, vertex(k), along, side(last), side(k), x)
         else

@@ -26,6 +26,8 @@ module gravier_polygon_pair
     real(dp), allocatable :: vertex(:, :), corner(:, :)
     !> [m]
     real(dp) :: rounding = 0.0_dp
+    !> whether a side that lies along another one reaches out to the sharp corners
+    logical :: reaches_out = .true.
   end type placed_piece_t
 
   !> A side of a piece from vertex k to the next, which is `along` a unit vector and has the unit normal `out`.
@@ -340,6 +342,8 @@ contains
     real(dp) :: way, over
     integer :: k, corner
 
+    ends(:, :) = side%ends
+    if (.not. piece%reaches_out) return
     do k = 1, 2
       corner = mod(side%k + k - 2, piece%n) + 1
       way = sum(side%along*(piece%corner(:, corner) - side%ends(:, k)))

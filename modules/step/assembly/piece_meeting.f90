@@ -87,6 +87,8 @@ contains
     type(seen_body_t), intent(in) :: a, b
     type(room_t), intent(inout) :: room
 
+    room%a%reaches_out = piece_a%reaches_out
+    room%b%reaches_out = piece_b%reaches_out
     call place_piece(piece_a%vertex, piece_a%corner, piece_a%rounding, a%radius, a%angle, a%centre(1:2), room%a)
     call place_piece(piece_b%vertex, piece_b%corner, piece_b%rounding, b%radius, b%angle, b%centre(1:2), room%b)
   end subroutine place_in_plane

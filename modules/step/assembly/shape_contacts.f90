@@ -316,6 +316,7 @@ contains
       call turn_vertex(piece%vertex(:, 1), a, centre)
       call find_ball_contacts(centre, a%radius*piece%rounding, work%near, alert, work%facets)
     else if (nd == 2) then
+      work%room%a%reaches_out = piece%reaches_out
       call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), work%room%a)
       call find_polygon_contacts(work%room%a, work%near, alert, work%facets)
     else
@@ -340,6 +341,7 @@ contains
     integer :: k
 
     if (size(normal) == 2) then
+      placed%reaches_out = piece%reaches_out
       call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), placed)
       call find_plane_manifold(placed, normal, -distance, alert, manifold)
       return
