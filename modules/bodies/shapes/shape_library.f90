@@ -47,6 +47,8 @@ module gravier_shape_library
     !> room for more than n
     type(body_shape_t), allocatable :: shape(:)
     type(point_counts_t) :: counts
+    !> whether flat sides end where round corners begin
+    logical :: are_round = .false.
   contains
     procedure :: add => shape_library_add
     procedure :: find => shape_library_find
@@ -63,6 +65,7 @@ contains
     class(shape_library_t), intent(inout) :: self
     integer :: k, p
 
+    self%are_round = .true.
     do k = 1, self%n
       do p = 1, size(self%shape(k)%piece)
         self%shape(k)%piece(p)%reaches_out = .false.

@@ -81,13 +81,16 @@ contains
   !> nearer to each other than the overlap are one, too. At a seam of two pieces with sides their points are apart by both roundings
   !> once the body leans: they are one at any lean, so that neither forces at a seam nor their number jump with it. Two points of
   !> which both pieces have one are none at a seam. What is kept depends on rounding nowhere but where two points at a seam are
-  !> equally deep.
-  pure subroutine pair_points_merge_near(points, near, seam)
+  !> equally deep. Where sides end at round corners, points at a seam are apart without a lean, too: they become one half-way
+  !> between them, whose gap has no kink where a body that rocks changes from one to the other.
+  pure subroutine pair_points_merge_near(points, near, seam, are_round)
     class(pair_points_t), intent(inout) :: points
     !> points of two pairs of pieces nearer to each other than this, with the same normal, are one [m]
     real(dp), intent(in) :: near
     !> the same for two pieces of the candidate, and of the antagonist, that touch one piece; 0 of a body of one piece [m]
     real(dp), intent(in) :: seam(2)
+    !> whether sides end at round corners
+    logical, intent(in) :: are_round
     logical :: dropped(points%n)
     integer :: kept(points%n), k, l
 
@@ -96,6 +99,7 @@ contains
     do k = 1, points%n
       kept(k) = k
     end do
+    if (are_round .and. maxval(seam) > near) call join_seams(points, seam, kept)
     do k = 1, points%n
       do l = k + 1, points%n
         if (kept(k) /= k .or. kept(l) /= l .or. points%key(2, k) == points%key(2, l)) cycle
@@ -108,7 +112,7 @@ contains
       end do
     end do
     dropped(:) = .false.
-    if (maxval(seam) > near) then
+    if (.not. are_round .and. maxval(seam) > near) then
       do k = 1, points%n
         do l = k + 1, points%n
           if (kept(k) /= k .or. kept(l) /= l) cycle
@@ -123,6 +127,30 @@ contains
     end do
     call drop(dropped, points)
   end subroutine pair_points_merge_near
+
+  !> Put the points of each seam half-way between them, into the place of the first.
+  pure subroutine join_seams(points, seam, kept)
+    class(pair_points_t), intent(inout) :: points
+    !> [m]
+    real(dp), intent(in) :: seam(2)
+    !> the point that each is one with: itself before
+    integer, intent(inout) :: kept(:)
+    integer :: alone(points%n), number(points%n), k, l
+
+    alone(:) = kept
+    number(:) = 1
+    do k = 1, points%n
+      do l = k + 1, points%n
+        if (kept(k) /= k .or. kept(l) /= l) cycle
+        if (.not. are_within(points, k, l, maxval(seam))) cycle
+        if (.not. are_within(points, k, l, seam_between(points, alone, seam, k, l))) cycle
+        points%point(:, k) = (number(k)*points%point(:, k) + number(l)*points%point(:, l))/(number(k) + number(l))
+        points%gap(k) = (number(k)*points%gap(k) + number(l)*points%gap(l))/(number(k) + number(l))
+        number(k) = number(k) + number(l)
+        kept(l) = k
+      end do
+    end do
+  end subroutine join_seams
 
   !> Whether two points with the same normal are so near to each other.
   pure logical function are_within(points, k, l, apart)

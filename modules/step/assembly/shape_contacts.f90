@@ -108,7 +108,7 @@ contains
       seam(:) = 0.0_dp
       seam(1) = seam_of(decomposition%shapes, candidate)
       if (j > 0) seam(2) = seam_of(decomposition%shapes, antagonist)
-      call points%merge_near(same*bodies%radius(i), seam)
+      call points%merge_near(same*bodies%radius(i), seam, decomposition%shapes%are_round)
     end associate
     call points%keep_deepest(view%list%points_of(p))
   end subroutine find_points

@@ -57,25 +57,25 @@ contains
 
     call points%add(manifold_of([0.0_dp, 1.0_dp], [0.1_dp, 0.2_dp], [1, 2]), 1, 1)
     call points%add(manifold_of([1.0_dp, 2.0_dp], [0.15_dp, 0.3_dp], [3, 4]), 2, 1)
-    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp], .false.)
     call check_equal(points%n, 3, "two points are one")
     call check_close(points%gap(2), 0.15_dp, 0.0_dp, "the deeper one stays")
     call check_close(points%gap(3), 0.3_dp, 0.0_dp, "and the others")
     points%n = 0
     call points%add(manifold_of([1.0_dp, 1.0_dp], [0.1_dp, 0.2_dp], [1, 2]), 1, 1)
-    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp], .false.)
     call check_equal(points%n, 2, "points of one pair of pieces")
     points%n = 0
     call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.3_dp, -0.2_dp], [1, 2]), 1, 1)
     call points%add(manifold_of([1.15_dp, 2.0_dp], [-0.1_dp, -0.3_dp], [3, 4]), 2, 1)
-    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp], .false.)
     call check_equal(points%n, 3, "points nearer to each other than the overlap")
     points%n = 0
     turned = manifold_of([1.0_dp], [0.1_dp], [1])
     call points%add(turned, 1, 1)
     turned%normal(:) = [1.0_dp, 0.0_dp, 0.0_dp]
     call points%add(turned, 2, 1)
-    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp])
+    call points%merge_near(1.0e-6_dp, [0.0_dp, 0.0_dp], .false.)
     call check_equal(points%n, 2, "points with other normals")
     call check_seam()
   end subroutine test_merge
@@ -90,7 +90,7 @@ contains
 
     call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
     call points%add(manifold_of([1.2_dp, 2.0_dp], [-0.04_dp, -0.01_dp], [3, 4]), 2, 1)
-    call points%merge_near(1.0e-6_dp, seam)
+    call points%merge_near(1.0e-6_dp, seam, .false.)
     call check_equal(points%n, 3, "points at a seam are one")
     call check_close(points%gap(2), -0.05_dp, 0.0_dp, "the deeper one at a seam")
     do k = 1, size(rounding)
@@ -99,7 +99,7 @@ contains
       gaps(2) = -0.04_dp
       call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
       call points%add(manifold_of([1.0_dp, 1.2_dp], gaps, [3, 4]), 2, 1)
-      call points%merge_near(1.0e-6_dp, seam)
+      call points%merge_near(1.0e-6_dp, seam, .false.)
       call check_equal(points%n, 3, "a piece has two points beside each other")
       call check_close(points%gap(2), -0.05_dp, 0.0_dp, "of points that are one and as deep the first")
       call check_equal(points%key(2, 2), feature_base + 1, "it is that of the first piece")
@@ -108,10 +108,24 @@ contains
     points%n = 0
     call points%add(manifold_of([0.0_dp, 1.0_dp], [-0.1_dp, -0.05_dp], [1, 2]), 1, 1)
     call points%add(manifold_of([1.2_dp, 2.0_dp], [-0.04_dp, -0.01_dp], [3, 4]), 2, 2)
-    call points%merge_near(1.0e-6_dp, seam)
+    call points%merge_near(1.0e-6_dp, seam, .false.)
     call check_equal(points%n, 4, "a seam beside a body of one piece")
-    call points%merge_near(1.0e-6_dp, [0.3_dp, 0.25_dp])
+    call points%merge_near(1.0e-6_dp, [0.3_dp, 0.25_dp], .false.)
     call check_equal(points%n, 3, "a seam over a seam")
+    ! where sides end at round corners, the points of a seam become one half-way between them, whichever is deeper
+    do k = -1, 1, 2
+      points%n = 0
+      gaps(1) = -0.1_dp
+      gaps(2) = -0.1_dp + 0.01_dp*k
+      call points%add(manifold_of([0.0_dp, 0.9_dp], gaps, [1, 2]), 1, 1)
+      gaps(1) = -0.1_dp - 0.01_dp*k
+      gaps(2) = -0.1_dp
+      call points%add(manifold_of([1.1_dp, 2.0_dp], gaps, [1, 2]), 2, 1)
+      call points%merge_near(1.0e-6_dp, [0.25_dp, 0.0_dp], .true.)
+      call check_equal(points%n, 3, "both ends and the seam")
+      call check_close(points%point(1, 2), 1.0_dp, 1.0e-15_dp, "half-way between the points of the seam")
+      call check_close(points%gap(2), -0.1_dp, 1.0e-15_dp, "its gap is the mean")
+    end do
   end subroutine check_seam
 
   subroutine test_deepest()
