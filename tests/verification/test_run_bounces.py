@@ -75,6 +75,29 @@ class Bounces(RunTestCase):
             self.assertGreater(history["kinetic_rotation"].max(), 1e-6)
             self.assertLess(history["kinetic_rotation"][-1000:].max(), 1e-18)
 
+    def test_seams_over_seams(self):
+        """A cluster of two squares at rest on its like presses in three points, whose springs bear a third of its weight each, whether their seams
+        lie exactly over each other or not."""
+        mass, stiffness, found = DENSITY * 0.02, 1e6, []
+        for shift in (0.0, 1e-5, 0.004):
+            place = self.here(f"seams {shift}")
+            os.makedirs(place)
+            write(os.path.join(place, "body.shapes"), "shape body\nrounding 0.01\npolygon -0.1 -0.05 0 -0.05 0 0.05 -0.1 0.05\n"
+                                                      "polygon 0 -0.05 0.1 -0.05 0.1 0.05 0 0.05\n")
+            write(os.path.join(place, "body.csv"), f"id,x,y,shape,radius\n1,0,0.05,body,\n2,{shift},0.15,body,\n")
+            run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "body.csv", "shapes": "body.shapes", "density": DENSITY,
+                                      "gravity": [0.0, -9.81], "wall_material": "m"},
+                            "material": {"name": "m"}, "law": {"materials": "m", "kind": "elastic", "normal_stiffness": stiffness, "friction": 0.5,
+                                                               "spring_restitution": 0.1, "tangential_damping": 0.5},
+                            "boundary": {"name": "plane", "shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
+                            "time": {"step": 5e-4, "steps": 1000}, "solver": {"accuracy": 1e-8, "tolerance": 1e-12, "velocity_scale": 0.1},
+                            "output": {"directory": "results", "every": 0}}, directory=place)
+            self.assert_status(run, 0)
+            lower, upper = run.results()["/steps/1000/bodies/position"][:, 1]
+            found.append((0.1 - (upper - lower)) * stiffness / (mass * 9.81))
+        # a shift tilts the upper one a little
+        np.testing.assert_allclose(found, 1.0 / 3.0, rtol=5e-3)
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -11,6 +11,9 @@ module gravier_pair_points
   real(dp), parameter :: same = 1.0e-6_dp
   !> depths that are equal, over the distance of points that are one
   real(dp), parameter :: equal = 1.0e-3_dp
+  !> where sides end at round corners, distance of points at a seam, over both roundings: across a corner of four pieces, and where
+  !> a seam lies over a seam, until the pieces beside both have a side in common
+  real(dp), parameter :: at_round_seams(2) = [1.42_dp, 1.99_dp], at_seams(2) = [1.0_dp, 1.0_dp]
   !> a point is deeper than another where it is so by this part of their distance
   real(dp), parameter :: as_deep = 1.0e-2_dp
 
@@ -117,7 +120,7 @@ contains
         do l = k + 1, points%n
           if (kept(k) /= k .or. kept(l) /= l) cycle
           if (.not. are_within(points, k, l, maxval(seam))) cycle
-          if (.not. are_within(points, k, l, seam_between(points, kept, seam, k, l))) cycle
+          if (.not. are_within(points, k, l, seam_between(points, kept, seam, at_seams, k, l))) cycle
           dropped(merge(l, k, is_before(points, near, k, l))) = .true.
         end do
       end do
@@ -135,15 +138,14 @@ contains
     real(dp), intent(in) :: seam(2)
     !> the point that each is one with: itself before
     integer, intent(inout) :: kept(:)
-    integer :: alone(points%n), number(points%n), k, l
+    integer :: number(points%n), k, l
 
-    alone(:) = kept
     number(:) = 1
     do k = 1, points%n
       do l = k + 1, points%n
         if (kept(k) /= k .or. kept(l) /= l) cycle
-        if (.not. are_within(points, k, l, maxval(seam))) cycle
-        if (.not. are_within(points, k, l, seam_between(points, alone, seam, k, l))) cycle
+        if (.not. are_within(points, k, l, maxval(at_round_seams)*maxval(seam))) cycle
+        if (.not. are_within(points, k, l, seam_between(points, kept, seam, at_round_seams, k, l))) cycle
         points%point(:, k) = (number(k)*points%point(:, k) + number(l)*points%point(:, l))/(number(k) + number(l))
         points%gap(k) = (number(k)*points%gap(k) + number(l)*points%gap(l))/(number(k) + number(l))
         number(k) = number(k) + number(l)
@@ -176,14 +178,17 @@ contains
 
   !> How far apart points `k` and `l` may be to be one at a seam: 0 if a pair of pieces has both, be it by points that are one with
   !> them [m].
-  pure real(dp) function seam_between(points, kept, seam, k, l) result(apart)
+  pure real(dp) function seam_between(points, kept, seam, over, k, l) result(apart)
     class(pair_points_t), intent(in) :: points
     !> the point that each is one with
     integer, intent(in) :: kept(:)
-    real(dp), intent(in) :: seam(2)
+    !> [m]; factors at one seam and where a seam of the one lies over a seam of the other
+    real(dp), intent(in) :: seam(2), over(2)
     integer, intent(in) :: k, l
     integer :: m, n
+    logical :: shares
 
+    shares = .false.
     apart = 0.0_dp
     do m = 1, points%n
       if (kept(m) /= k) cycle
@@ -195,16 +200,17 @@ contains
             return
           end if
           if (one/feature_base == other/feature_base) then
-            apart = max(apart, seam(2))
+            apart = max(apart, over(1)*seam(2))
+            shares = .true.
           else if (mod(one, feature_base) == mod(other, feature_base)) then
-            apart = max(apart, seam(1))
-          else
-            ! a seam of the one over a seam of the other
-            apart = max(apart, minval(seam))
+            apart = max(apart, over(1)*seam(1))
+            shares = .true.
           end if
         end associate
       end do
     end do
+    ! no piece touches both: a seam of the one lies over a seam of the other
+    if (.not. shares) apart = over(2)*minval(seam)
   end function seam_between
 
   !> Keep at most so many points, those with the smallest gaps.

@@ -126,6 +126,26 @@ contains
       call check_close(points%point(1, 2), 1.0_dp, 1.0e-15_dp, "half-way between the points of the seam")
       call check_close(points%gap(2), -0.1_dp, 1.0e-15_dp, "its gap is the mean")
     end do
+    ! a seam over a seam that is shifted by nearly both roundings: one point as long as the pieces beside have no side in common
+    points%n = 0
+    gaps(:) = -0.05_dp
+    call points%add(manifold_of([0.0_dp, 0.9_dp], gaps, [1, 2]), 1, 1)
+    call points%add(manifold_of([1.29_dp, 2.0_dp], gaps, [1, 2]), 2, 2)
+    call points%merge_near(1.0e-6_dp, [0.201_dp, 0.201_dp], .true.)
+    call check_equal(points%n, 3, "a seam over a seam with round corners")
+    points%n = 0
+    call points%add(manifold_of([0.0_dp, 0.9_dp], gaps, [1, 2]), 1, 1)
+    call points%add(manifold_of([1.1_dp, 1.11_dp], gaps, [1, 2]), 2, 1)
+    call points%add(manifold_of([1.31_dp, 2.0_dp], gaps, [1, 2]), 2, 2)
+    call points%merge_near(1.0e-6_dp, [0.201_dp, 0.201_dp], .true.)
+    call check_equal(points%n, 4, "with a side in common both points of it stay apart")
+    ! across a corner where two pieces meet, whose roundings are 0.1 along both axes of the plane
+    points%n = 0
+    gaps(:) = -0.01_dp
+    call points%add(manifold_of([0.0_dp, 0.9_dp], gaps, [1, 2]), 1, 1)
+    call points%add(manifold_of([1.18_dp, 2.0_dp], gaps, [1, 2]), 2, 1)
+    call points%merge_near(1.0e-6_dp, [0.201_dp, 0.0_dp], .true.)
+    call check_equal(points%n, 3, "a corner of four pieces")
   end subroutine check_seam
 
   subroutine test_deepest()
