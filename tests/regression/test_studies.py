@@ -90,7 +90,7 @@ class Studies(unittest.TestCase):
                     ("sound", ["--out", place], f"{place}: there is something that no study has made")):
                 with self.subTest(name=name, options=options):
                     run = subprocess.run([sys.executable, os.path.join(SOURCE, f"drivers/studies/study_{name}.py"), *options], cwd=place,
-                                         capture_output=True, text=True, check=False)
+                                         capture_output=True, text=True, check=False, timeout=300)
                     self.assertEqual(run.returncode, 2, run.stderr)
                     self.assertEqual(len(run.stderr.splitlines()), 1, run.stderr)
                     self.assertIn(line, run.stderr)
