@@ -59,8 +59,6 @@ def main():
     parser.add_argument("--seed", type=whole(0), default=101)
     parser.add_argument("--jobs", type=whole(1), default=1)
     options = parser.parse_args()
-    if options.jobs < 1:
-        parser.error(f"--jobs {options.jobs}: expected 1 or more")
     count = options.count or (200_000 if options.quick else 10_000_000)
     jobs = [start(count//options.jobs, options.seed + k) for k in range(options.jobs)]
     said = [job.communicate()[0] for job in jobs]

@@ -85,7 +85,7 @@ class CutSprings(RunTestCase):
                             np.testing.assert_allclose(row, tables[1][pair], rtol=0, atol=max(near, 1e-7) * RADIUS, err_msg=f"{kind} {pair}")
 
     def test_elongations(self):
-        """Elongations lie in the tangent plane and are those of the forces, with k_t = 2/7 k_n: force = - k_t elongation on the candidate. Those of a
+        """Elongations lie in the tangent plane and are those of the forces: force on the candidate = - k_t elongation. Those of a
         bodies file are those of the last state."""
         for dimension in (2, 3):
             with self.subTest(dimension=dimension):
@@ -101,8 +101,7 @@ class CutSprings(RunTestCase):
                 with h5py.File(run.path("results", "final_bodies.h5")) as file:
                     kept = file["contacts"]
                     table = dict(zip(zip(kept["candidate"][:], kept["normal"][:, 0]), kept["elongation"][:]))
-                    self.assertEqual(kept["elongation"].attrs["unit"].decode() if isinstance(kept["elongation"].attrs["unit"], bytes)
-                                     else kept["elongation"].attrs["unit"], "m")
+                    self.assertIn(kept["elongation"].attrs["unit"], (b"m", "m"))
                 bears = normal_force > 0.0
                 self.assertEqual(len(table), bears.sum())
                 for candidate, normal, row in zip(contacts.candidate[bears], contacts.normal[bears], contacts.elongation[bears]):

@@ -75,7 +75,7 @@ contains
     divisor(n_low + 1:) = high(n_high:1:-1)
   end subroutine list_divisors
 
-  !> Refuse the scene is too small for so many subdomains; cheap, whatever their number. Failure: status_input.
+  !> Refuse more subdomains than the scene has cells; cheap, whatever their number. Failure: status_input.
   subroutine check_subdomains(lower, upper, edge, n_subdomains, error)
     !> (nd) [m]
     real(dp), intent(in) :: lower(:), upper(:)

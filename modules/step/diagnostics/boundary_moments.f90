@@ -122,7 +122,7 @@ contains
         & place(1:nd) = place(1:nd) - 0.5_dp*sub%gap(c)*sub%hot(q, 1:nd, g)
       call boundary%find_image(place(1:nd), arm)
       arm(:) = arm - pivot
-      ! planes have no middle that an image could be near to: it is the pivot
+      ! a plane has no middle: its image is the one nearest to the pivot
       if (boundary%is_plane()) then
         do d = 1, nd
           if (boundary%period(d) > 0.0_dp) arm(d) = arm(d) - boundary%period(d)*anint(arm(d)/boundary%period(d))

@@ -4,7 +4,7 @@ module gravier_mean_region
   use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: mean_region_t, region_grid_t, share_list_t, unbounded, region_name_length, region_words
+  public :: mean_region_t, region_grid_t, share_list_t, unbounded, region_words
 
   !> coordinate of a side that a region does not have [m]
   real(dp), parameter :: unbounded = 1.0e30_dp
