@@ -147,7 +147,7 @@ contains
         & size(simulation%config%laws) + size(simulation%config%insertions) == 0 .and. &
         & scene%gravity_table == "" .and. .not. any(abs(scene%body_force) > 0.0_dp) .and. .not. simulation%decomposition%period%on()
       if (known) known = boundaries(1)%is_plane() .and. .not. boundaries(1)%is_driven() .and. &
-        & boundaries(1)%remove_at >= huge(1.0_dp) .and. .not. allocated(boundaries(1)%table%has) .and. &
+        & boundaries(1)%remove_at >= huge(1.0_dp) .and. .not. boundaries(1)%drive%moves() .and. &
         & .not. any(abs(boundaries(1)%velocity) > 0.0_dp) .and. .not. any(abs(boundaries(1)%spin) > 0.0_dp)
       if (.not. known) return
       motion%normal(:) = boundaries(1)%surface%axis(1:nd)

@@ -108,7 +108,7 @@ contains
     associate (boundaries => simulation%decomposition%boundaries)
       do b = 1, simulation%n_walls
         if (.not. boundaries(b)%is_driven()) cycle
-        boundaries(b)%given_force(:) = simulation%config%sample%pressure*facing_area(simulation%decomposition, b)* &
+        boundaries(b)%drive%force(:) = simulation%config%sample%pressure*facing_area(simulation%decomposition, b)* &
           & boundaries(b)%surface%axis
         where (boundaries(b)%free) boundaries(b)%velocity = keep*min(max(boundaries(b)%velocity, -limit), limit)
       end do

@@ -179,6 +179,10 @@ contains
                   to_text(scene%dimension)//" numbers")
       call expect(report, scene%gravity_table == "" .or. .not. is_given(report, "scene", "gravity"), "scene", "gravity", error, &
                   "none where "//shown_text(report, "scene", "gravity_table")//" replaces it")
+      call expect(report, scene%gravity_table /= "" .or. .not. scene%gravity_table_repeats, "scene", "gravity_table_repeats", &
+                  error, ".false. without a gravity_table")
+      call expect(report, scene%cell_table /= "" .or. .not. scene%cell_table_repeats, "scene", "cell_table_repeats", error, &
+                  ".false. without a cell_table")
       call expect(report, scene%alert_distance >= 0.0_dp .or. .not. scene%alert_distance_given, "scene", "alert_distance", error)
       call expect(report, scene%skin >= 0.0_dp .or. .not. scene%skin_given, "scene", "skin", error)
       call expect(report, scene%list_steps >= 0.0_dp, "scene", "list_steps", error)

@@ -46,6 +46,7 @@ contains
       call check_wall(report, config, i, error)
       call check_size(report, config%boundaries(i), error)
       call check_free(report, config%boundaries(i), error)
+      call check_oscillation(report, config%boundaries(i), error)
       call check_loads(report, config%scene%dimension, config%boundaries(i), error)
       call check_contact(report, config%scene%dimension, config%boundaries(i)%contact, "boundary", "", error)
       call expect(report, config%boundaries(i)%remove_at >= 0.0_dp, "boundary", "remove_at", error)
@@ -163,6 +164,26 @@ contains
     call expect(report, all(abs(boundary%rotation) <= 0.0_dp), "boundary", "rotation", error, &
                 "0 where a component of the translation is free")
   end subroutine check_free
+
+  !> An oscillation has a frequency and moves nothing that forces move. What belongs to it, or to a table, stands beside it.
+  subroutine check_oscillation(report, boundary, error)
+    type(report_t), intent(in) :: report
+    type(boundary_config_t), intent(in) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+
+    call expect(report, .not. any(boundary%free .and. abs(boundary%oscillation) > 0.0_dp), "boundary", "oscillation", error, &
+                "0 along each component that is free")
+    call expect(report, .not. (any(boundary%free) .and. any(abs(boundary%rotation_oscillation) > 0.0_dp)), "boundary", &
+                "rotation_oscillation", error, "0 where a component of the translation is free")
+    if (any(abs(boundary%oscillation) > 0.0_dp) .or. any(abs(boundary%rotation_oscillation) > 0.0_dp)) then
+      call expect(report, boundary%frequency > 0.0_dp, "boundary", "frequency", error, "> 0 where the boundary oscillates")
+    else
+      call expect(report, abs(boundary%frequency) <= 0.0_dp, "boundary", "frequency", error, "0 without an oscillation")
+      call expect(report, abs(boundary%phase) <= 0.0_dp, "boundary", "phase", error, "0 without an oscillation")
+    end if
+    call expect(report, boundary%table /= "" .or. .not. boundary%table_repeats, "boundary", "table_repeats", error, &
+                ".false. without a table")
+  end subroutine check_oscillation
 
   !> Loads without effect: on what is not free.
   subroutine check_loads(report, dimension, boundary, error)

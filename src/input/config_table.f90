@@ -48,6 +48,8 @@ module gravier_config_table
      key_t("scene", "gravity_table", kind_text, "''", "", &
            "path of a CSV file with columns `time,gx,gy` and, in 3D, `gz`, which replaces `gravity`: linear in time between "// &
            "its rows, constant outside"), &
+     key_t("scene", "gravity_table_repeats", kind_logical, ".false.", "", &
+           "the table begins anew after its last row, which is as the first"), &
      key_t("scene", "body_force", kind_real, "3*0", "", "force on each volume of the grains; its third component is 0 in 2D", &
            count=3, unit="N/m^3, N/m^2 in 2D"), &
      key_t("scene", "bodies", kind_choice, "''", "column lattice file sample none", &
@@ -118,6 +120,8 @@ module gravier_config_table
            "path of a CSV file with the column `time` and any of those of the moving cell, such as `strain_rate_x`, "// &
            "`shear_rate_xy`, `pressure_x` and `shear_stress_xy`, which replaces rates and stresses of the period: linear in "// &
            "time between its rows, constant outside"), &
+     key_t("scene", "cell_table_repeats", kind_logical, ".false.", "", &
+           "the table begins anew after its last row, which is as the first"), &
      key_t("scene", "cell_inertia", kind_real, "0.1", "> 0", &
            "inertia of the period that stresses drive, over the mass of the grains times the square of its length"), &
      key_t("scene", "alert_distance", kind_real, "-1", ">= 0", "gap below which two bodies make a contact", &
@@ -160,6 +164,16 @@ module gravier_config_table
      key_t("boundary", "rotation", kind_real, "3*0", "", &
            "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &
            count=3, planar=1, unit="rad/s"), &
+     key_t("boundary", "oscillation", kind_real, "3*0", "", &
+           "amplitude of a displacement by sin(2 pi `frequency` t + `phase`), beside the other motion; 0 where a component is "// &
+           "`free`, and its third component in 2D", &
+           count=3, unit="m"), &
+     key_t("boundary", "rotation_oscillation", kind_real, "3*0", "", &
+           "amplitude of a rotation in the same manner: one entry in 2D, three in 3D; 0 where a component is `free`", &
+           count=3, planar=1, unit="rad"), &
+     key_t("boundary", "frequency", kind_real, "0", "", "periods of the oscillation in a second, > 0; 0 without one", &
+           unit="Hz", note="required with an oscillation"), &
+     key_t("boundary", "phase", kind_real, "0", "", "angle of the oscillation at time 0; 0 without one", unit="rad"), &
      key_t("boundary", "pivot", kind_real, "3*0", "", "the point it turns about", &
            count=3, unit="m", note="the value of `point`"), &
      key_t("boundary", "free", kind_logical, "3*.false.", "", &
@@ -176,6 +190,8 @@ module gravier_config_table
      key_t("boundary", "table", kind_text, "''", "", &
            "path of a CSV file with a column `time` and any of `vx,vy,vz`, `omega` (2D) or `wx,wy,wz` (3D), `fx,fy,fz`, "// &
            "`pressure`, which replace the constants: linear in time, constant outside"), &
+     key_t("boundary", "table_repeats", kind_logical, ".false.", "", &
+           "the table begins anew after its last row, which is as the first"), &
      key_t("boundary", "friction", kind_real, "-1", ">= 0", "friction coefficient between grains and this boundary", &
            note="the value of `wall_friction` of `&scene`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "restitution", kind_real, "-1", "in [0, 1]", &

@@ -62,6 +62,8 @@ module gravier_config_types
     real(dp) :: body_force(3)
     !> CSV tables in time, of the gravity and of what moves the periodic cell; blank: none
     character(len=text_length) :: gravity_table, cell_table
+    !> these tables begin anew after their last row
+    logical :: gravity_table_repeats, cell_table_repeats
     !> m; negative when not given, see alert_distance_given
     real(dp) :: alert_distance
     !> false: the alert distance is 0.1 of the largest radius
@@ -211,6 +213,10 @@ module gravier_config_types
     real(dp) :: velocity(3)
     !> rad/s; in 2D the first entry is the rate about z and the others are 0
     real(dp) :: rotation(3)
+    !> m and rad, as velocity and rotation: amplitudes of an oscillation
+    real(dp) :: oscillation(3), rotation_oscillation(3)
+    !> Hz, > 0 where there is an oscillation, and rad
+    real(dp) :: frequency, phase
     !> m: the point it turns about; the value of point when not given (0 for grains and walls)
     real(dp) :: pivot(3)
     logical :: pivot_given = .false.
@@ -224,6 +230,8 @@ module gravier_config_types
     real(dp) :: mass
     !> CSV table of the motion and the loads in time; blank: none
     character(len=text_length) :: table
+    !> it begins anew after its last row
+    logical :: table_repeats
     !> wall_contact of &scene where not given
     type(coefficients_t) :: contact
     type(given_coefficients_t) :: contact_given

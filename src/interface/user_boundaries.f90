@@ -5,6 +5,7 @@ module gravier_user_boundaries
   use gravier_text, only: to_text
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_boundary, only: boundary_t
+  use gravier_boundary_drive, only: drives_velocity, drives_spin, drives_force, drives_pressure
   use gravier_scene_boundaries, only: check_pressed
   use gravier_user_loop, only: user_loop_t, numbers_text
   implicit none
@@ -46,9 +47,9 @@ contains
       case ("force")
         values = simulation%boundary_impulses(:, b)/simulation%physics%h
       case ("applied_force")
-        values = boundary%given_force(1:nd)
+        values = boundary%drive%force(1:nd)
       case ("pressure")
-        allocate (values(1), source=boundary%given_pressure)
+        allocate (values(1), source=boundary%drive%pressure)
       case ("friction")
         allocate (values(1), source=boundary%contact%friction)
       case default
@@ -93,16 +94,16 @@ contains
       case ("applied_force")
         call set_force(boundary, values, error)
       case ("pressure")
-        call check_pressure(boundary, nd, error)
+        call check_pressure(boundary, error)
         if (.not. allocated(error)) call check_pressed(loop%run%simulation%decomposition%boundaries, b, nd, &
           & loop%run%simulation%decomposition%period%length, error)
-        if (.not. allocated(error)) boundary%given_pressure = values(1)
+        if (.not. allocated(error)) boundary%drive%pressure = values(1)
       case ("friction")
         call loop%set_friction(b, values(1), error)
         if (allocated(error)) error%message = "boundary '"//boundary%name//"': "//error%message
       end select
       if (allocated(error) .or. name == "friction") return
-      boundary%steered = .true.
+      boundary%drive%steered = .true.
     end associate
     call loop%run%simulation%wake()
     call loop%note(name, b, values)
@@ -119,10 +120,10 @@ contains
     do d = 1, size(values)
       if (boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse(boundary, "velocity", "along "//axes(d)// &
         & ": forces move it; expected 0 there", error)
-      if (in_table(boundary, d)) call refuse(boundary, "velocity", "along "//axes(d)// &
+      if (boundary%drive%gives(drives_velocity, d)) call refuse(boundary, "velocity", "along "//axes(d)// &
         & ": its table gives it; expected a boundary without this column", error)
     end do
-    if (.not. allocated(error)) boundary%given_velocity(1:size(values)) = values
+    if (.not. allocated(error)) boundary%drive%velocity(1:size(values)) = values
   end subroutine set_velocity
 
   subroutine set_spin(boundary, turns, values, error)
@@ -136,12 +137,12 @@ contains
 
     do d = 1, size(values)
       k = 3 - size(values) + d
-      if (in_table(boundary, merge(2, 3, size(values) == 1) + d)) call refuse(boundary, "spin", "about "//axes(k)// &
+      if (boundary%drive%gives(drives_spin, k)) call refuse(boundary, "spin", "about "//axes(k)// &
         & ": its table gives it; expected a boundary without this column", error)
       if (abs(values(d)) > 0.0_dp .and. .not. turns(d)) call refuse(boundary, "spin", "about "//axes(k)// &
         & ": the boundary does not turn about it in the case; expected 0, or a rotation in the case", error)
     end do
-    if (.not. allocated(error)) boundary%given_spin(4 - size(values):) = values
+    if (.not. allocated(error)) boundary%drive%spin(4 - size(values):) = values
   end subroutine set_spin
 
   subroutine set_force(boundary, values, error)
@@ -154,34 +155,24 @@ contains
     do d = 1, size(values)
       if (.not. boundary%free(d) .and. abs(values(d)) > 0.0_dp) call refuse(boundary, "applied_force", "along "//axes(d)// &
         & ": not a free component; expected 0 there", error)
-      if (in_table(boundary, merge(3, 6, size(values) == 2) + d)) call refuse(boundary, "applied_force", "along "//axes(d)// &
+      if (boundary%drive%gives(drives_force, d)) call refuse(boundary, "applied_force", "along "//axes(d)// &
         & ": its table gives it; expected a boundary without this column", error)
     end do
-    if (.not. allocated(error)) boundary%given_force(1:size(values)) = values
+    if (.not. allocated(error)) boundary%drive%force(1:size(values)) = values
   end subroutine set_force
 
   !> Refuse a pressure on what does not move along its normal, or has it from a table.
-  subroutine check_pressure(boundary, nd, error)
+  subroutine check_pressure(boundary, error)
     type(boundary_t), intent(in) :: boundary
-    integer, intent(in) :: nd
     type(error_t), allocatable, intent(inout) :: error
     logical :: pressed
 
     pressed = boundary%is_plane()
     if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
     if (.not. pressed) call refuse(boundary, "pressure", "is for a plane of which a component along its normal is free", error)
-    if (in_table(boundary, merge(6, 10, nd == 2))) call refuse(boundary, "pressure", &
+    if (boundary%drive%gives(drives_pressure, 1)) call refuse(boundary, "pressure", &
       & "is given by its table; expected a boundary without this column", error)
   end subroutine check_pressure
-
-  !> Whether the table of the boundary has column `k`.
-  pure logical function in_table(boundary, k)
-    type(boundary_t), intent(in) :: boundary
-    integer, intent(in) :: k
-
-    in_table = .false.
-    if (allocated(boundary%table%has)) in_table = boundary%table%has(k)
-  end function in_table
 
   subroutine refuse(boundary, name, text, error)
     type(boundary_t), intent(in) :: boundary

@@ -67,7 +67,7 @@ contains
       allocate (self%turns(3, size(boundaries)))
       do b = 1, size(boundaries)
         do k = 1, 3
-          self%turns(k, b) = boundaries(b)%turns_about(k)
+          self%turns(k, b) = boundaries(b)%drive%turns_about(k)
         end do
       end do
     end associate

@@ -115,8 +115,8 @@ contains
     do b = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(b))
         if (.not. boundary%is_faceted()) cycle
-        facets_move = facets_move .or. boundary%is_driven() .or. allocated(boundary%table%has) .or. boundary%turns() .or. &
-          & any(abs(boundary%given_velocity) > 0.0_dp) .or. boundary%remove_at < huge(1.0_dp) .or. boundary%steered
+        facets_move = facets_move .or. boundary%is_driven() .or. boundary%drive%moves() .or. &
+          & boundary%remove_at < huge(1.0_dp) .or. boundary%drive%steered
       end associate
     end do
   end function facets_move

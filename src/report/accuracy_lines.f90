@@ -2,12 +2,12 @@
 module gravier_accuracy_lines
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
-  use gravier_run_tally, only: run_tally_t
+  use gravier_run_tally, only: run_tally_t, most_drift
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: accuracy_lines, error_line, scale_range_line, overlap_lines, layer_line, creep_lines, goal_name, goal_text, &
-    & percent, plain
+  public :: accuracy_lines, error_line, scale_range_line, drift_lines, drifts, overlap_lines, layer_line, creep_lines, &
+    & goal_name, goal_text, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 
@@ -18,8 +18,8 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    text = error_line(simulation)//scale_range_line(simulation%tally)//overlap_lines(simulation)//layer_line(simulation%tally)// &
-      & creep_lines(simulation%tally)
+    text = error_line(simulation)//scale_range_line(simulation%tally)//drift_lines(simulation)//overlap_lines(simulation)// &
+      & layer_line(simulation%tally)//creep_lines(simulation%tally)
     if (simulation%restarted) text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)// &
       & " steps since the restart"//newline
   end function accuracy_lines
@@ -80,6 +80,29 @@ contains
     end do
     text = text//newline
   end function scale_range_line
+
+  !> Whether grains have moved visibly in steps whose motion is not told from the errors of their solves.
+  pure logical function drifts(simulation)
+    type(simulation_t), intent(in) :: simulation
+    drifts = simulation%tally%drift > most_drift*simulation%velocity_scale%diameter
+  end function drifts
+
+  !> How far grains have moved in steps whose motion is not told from the errors of their solves, where that can be seen, and what
+  !> resolves it. Errors are about proportional to the goal, so that half of the goal which would keep the way below a bound does so.
+  function drift_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = ""
+    if (.not. drifts(simulation)) return
+    associate (tally => simulation%tally, d => simulation%velocity_scale%diameter)
+      text = "drift       in "//to_text(tally%unresolved)//" of "//counted(tally%steps, "step")// &
+        & " grains moved no faster than twice the velocity error of the solve, by "//plain(tally%drift/d)// &
+        & " mean diameters in all"//newline//indent//"that motion may be nothing but errors; the "// &
+        & goal_text(simulation, 0.5_dp*most_drift*d/tally%drift)//" would keep them below "//plain(most_drift)// &
+        & " mean diameters"//newline
+    end associate
+  end function drift_lines
 
   !> Overlaps at the start and later, and by how much projections have shifted the grains.
   function overlap_lines(simulation) result(text)

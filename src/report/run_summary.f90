@@ -7,7 +7,7 @@ module gravier_run_summary
   use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
-  use gravier_accuracy_lines, only: goal_name, goal_text, percent, plain
+  use gravier_accuracy_lines, only: goal_name, goal_text, drifts, percent, plain
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -190,6 +190,9 @@ contains
           text = text//": the results are not those of the contact law"
         end if
       end if
+      if (drifts(simulation)) text = text//"; in "//to_text(tally%unresolved)//" of "//steps// &
+        & " grains moved by no more than the errors of solves, "//plain(tally%drift/simulation%velocity_scale%diameter)// &
+        & " mean diameters in all: see `drift`"
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate
@@ -200,7 +203,8 @@ contains
     type(simulation_t), intent(in) :: simulation
 
     associate (tally => simulation%tally, solver => simulation%config%solver)
-      may = simulation%failed == 0 .and. .not. tally%mended_share() > often_mended .and. .not. overlaps_grew(simulation)
+      may = simulation%failed == 0 .and. .not. tally%mended_share() > often_mended .and. .not. overlaps_grew(simulation) .and. &
+        & .not. drifts(simulation)
       if (goal_name(simulation) == "accuracy") then
         may = may .and. 10.0_dp*solver%accuracy <= loosest*(1.0_dp + epsilon(1.0_dp))
       else

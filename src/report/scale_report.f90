@@ -194,7 +194,7 @@ contains
     call look(simulation%cell_drive%table, "&scene cell_table = '"//trim(simulation%config%scene%cell_table)//"'")
     do b = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(b))
-        call look(boundary%table, "boundary '"//boundary%name//"': its table")
+        call look(boundary%drive%table, "boundary '"//boundary%name//"': its table")
       end associate
     end do
 

@@ -143,7 +143,7 @@ contains
     call add_table(simulation%cell_drive%table, trim(simulation%config%scene%cell_table))
     do b = 1, size(simulation%config%boundaries)
       associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))
-        call add_table(boundary%table, trim(given%table))
+        call add_table(boundary%drive%table, trim(given%table))
         if (boundary%is_faceted()) call add_contents(trim(given%file), boundary%surface%digest())
       end associate
     end do

@@ -106,7 +106,7 @@ contains
     self%config = config
     self%gravity_table = none
     if (config%scene%gravity_table /= "") call self%gravity_table%read(trim(config%scene%gravity_table), &
-      & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), error)
+      & trim(merge("gx gy   ", "gx gy gz", config%scene%dimension == 2)), config%scene%gravity_table_repeats, error)
     call comm%agree(error)
     if (allocated(error)) return
     call make_scene(comm, config, scene, error)

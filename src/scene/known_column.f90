@@ -31,7 +31,8 @@ contains
     type(boundary_config_t), intent(in) :: boundary
 
     is_ground_at_rest = boundary%shape == "wall" .and. .not. (boundary%remove_at_given .or. boundary%table /= "" .or. &
-      & any(boundary%free) .or. any(abs(boundary%velocity) > 0.0_dp) .or. any(abs(boundary%rotation) > 0.0_dp))
+      & any(boundary%free) .or. boundary%frequency > 0.0_dp .or. &
+      & any(abs(boundary%velocity) > 0.0_dp) .or. any(abs(boundary%rotation) > 0.0_dp))
   end function is_ground_at_rest
 
 end module gravier_known_column

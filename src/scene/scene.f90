@@ -358,8 +358,7 @@ contains
     pure logical function moves(boundary)
       type(boundary_t), intent(in) :: boundary
 
-      moves = any(abs(boundary%given_velocity) > 0.0_dp) .or. boundary%turns()
-      if (allocated(boundary%table%has)) moves = .true.
+      moves = boundary%drive%moves()
     end function moves
 
   end subroutine deduce_effects

@@ -8,7 +8,8 @@ module gravier_scene_boundaries
   use gravier_given_contacts, only: name_length
   use gravier_surface_registry, only: make_surface, wall_of_bodies
   use gravier_mesh_file, only: read_mesh
-  use gravier_boundary, only: boundary_t, drive_names
+  use gravier_boundary, only: boundary_t
+  use gravier_boundary_drive, only: drive_names, drives_velocity, drives_spin, drives_force, drives_pressure
   use gravier_facing_planes, only: faces_along, open_axis, is_pressed
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_wall_side, only: wall_side_t, wall_side_of
@@ -63,7 +64,8 @@ contains
         end if
         boundary%material = material_number(config, config%boundaries(b)%material)
         if (boundary%is_faceted()) call read_facets(trim(config%boundaries(b)%file), nd, boundary, error)
-        if (config%boundaries(b)%table /= "") call boundary%table%read(trim(config%boundaries(b)%table), drive_names(nd), error)
+        if (config%boundaries(b)%table /= "") call boundary%drive%table%read( &
+          & trim(config%boundaries(b)%table), drive_names(nd), config%boundaries(b)%table_repeats, error)
       end associate
     end do
     call comm%agree(error)
@@ -239,21 +241,22 @@ contains
     character(len=*), intent(in) :: path
     type(error_t), allocatable, intent(inout) :: error
     character(len=1), parameter :: axes(3) = ["x", "y", "z"]
-    integer :: d, force
-    logical :: pressed
+    integer :: d
+    logical :: pressed, turned
 
-    if (.not. allocated(boundary%table%has)) return
-    force = merge(3, 6, nd == 2)
     do d = 1, nd
-      if (boundary%table%has(d) .and. boundary%free(d)) call refuse("v"//axes(d), "no such column where this component is free")
-      if (boundary%table%has(force + d) .and. .not. boundary%free(d)) call refuse("f"//axes(d), &
+      if (boundary%drive%gives(drives_velocity, d) .and. boundary%free(d)) call refuse("v"//axes(d), &
+        & "no such column where this component is free")
+      if (boundary%drive%gives(drives_force, d) .and. .not. boundary%free(d)) call refuse("f"//axes(d), &
         & "no such column where this component is not free")
     end do
-    if (boundary%is_driven() .and. boundary%turns()) call refuse("of a rotation rate", &
+    turned = boundary%drive%gives(drives_spin, 3)
+    if (nd == 3) turned = turned .or. boundary%drive%gives(drives_spin, 1) .or. boundary%drive%gives(drives_spin, 2)
+    if (boundary%is_driven() .and. turned) call refuse("of a rotation rate", &
       & "no such column where a component of the translation is free")
     pressed = boundary%is_plane()
     if (pressed) pressed = any(boundary%free .and. abs(boundary%surface%axis) > 0.0_dp)
-    if (boundary%table%has(merge(6, 10, nd == 2)) .and. .not. pressed) call refuse("pressure", &
+    if (boundary%drive%gives(drives_pressure, 1) .and. .not. pressed) call refuse("pressure", &
       & "no such column but for a plane of which a component along normal is free")
 
   contains
@@ -279,7 +282,7 @@ contains
 
     do b = 1, size(boundaries)
       if (allocated(error)) return
-      if (.not. is_pressed(boundaries(b), nd)) cycle
+      if (.not. is_pressed(boundaries(b))) cycle
       call check_pressed(boundaries, b, nd, period, error)
       if (allocated(error)) error%message = file//": "//error%message
     end do
@@ -329,19 +332,33 @@ contains
     where (config%free)
       boundary%velocity = config%velocity
     elsewhere
-      boundary%given_velocity = config%velocity
+      boundary%drive%velocity = config%velocity
     end where
-    boundary%given_spin(:) = config%rotation
-    if (nd == 2) then
-      boundary%given_spin(3) = config%rotation(1)
-      boundary%given_spin(1) = 0.0_dp
-    end if
+    call take_rotation(config%rotation, boundary%drive%spin)
+    call take_rotation(config%rotation_oscillation, boundary%drive%rotation_oscillation)
+    boundary%drive%oscillation(:) = config%oscillation
+    boundary%drive%frequency = config%frequency
+    boundary%drive%phase = config%phase
     boundary%free(:) = config%free
-    boundary%given_force(:) = config%force
-    boundary%given_pressure = config%pressure
+    boundary%drive%force(:) = config%force
+    boundary%drive%pressure = config%pressure
     boundary%mass = config%mass
     boundary%contact = config%contact
     boundary%remove_at = config%remove_at
+
+  contains
+
+    !> In 2D the only entry of the input is the one about the third axis.
+    subroutine take_rotation(entries, rotation)
+      real(dp), intent(in) :: entries(3)
+      real(dp), intent(out) :: rotation(3)
+
+      rotation(:) = entries
+      if (nd == 3) return
+      rotation(3) = entries(1)
+      rotation(1) = 0.0_dp
+    end subroutine take_rotation
+
   end subroutine set_boundary
 
 end module gravier_scene_boundaries

@@ -74,7 +74,7 @@ contains
       do k = 1, n
         names = names//" "//trim(stress_columns(cell_component(k, nd)))
       end do
-      call table%read(trim(config%scene%cell_table), names, error)
+      call table%read(trim(config%scene%cell_table), names, config%scene%cell_table_repeats, error)
       if (allocated(error)) return
       do k = 1, n
         if (.not. (table%has(k) .or. table%has(n + k))) cycle

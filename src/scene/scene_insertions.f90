@@ -152,7 +152,7 @@ contains
 
     moves = .false.
     do b = 1, size(boundaries)
-      moves = moves .or. boundaries(b)%is_driven() .or. boundaries(b)%is_moved() .or. allocated(boundaries(b)%table%has) .or. &
+      moves = moves .or. boundaries(b)%is_driven() .or. boundaries(b)%is_moved() .or. boundaries(b)%drive%moves() .or. &
         & boundaries(b)%remove_at < huge(1.0_dp)
     end do
   end function any_moves

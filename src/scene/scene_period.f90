@@ -59,17 +59,17 @@ contains
       real(dp) :: width
 
       width = 2.0_dp*boundary%half_width(d)
-      if (features%faceted .and. .not. boundary%turns()) then
+      if (features%faceted .and. .not. boundary%drive%turns()) then
         if (width > (1.0_dp + straight)*scene%period%length(d)) call refuse(boundary, "a width of at most the period of "// &
           & to_text(scene%period%length(d), 4)//" m, here "//to_text(width, 4)//" m, along")
         return
       end if
       ! an edge round the period has no end
-      if (boundary%surface%edge_round(d, scene%period%length(d)) > 0 .and. .not. boundary%turns()) return
+      if (boundary%surface%edge_round(d, scene%period%length(d)) > 0 .and. .not. boundary%drive%turns()) return
       if (.not. features%encloses) width = width + reach
       if (.not. width > scene%period%length(d)) return
       or_edge = ""
-      if (.not. (boundary%surface%radius > 0.0_dp .or. boundary%turns())) or_edge = ", or an edge of that length along it"
+      if (.not. (boundary%surface%radius > 0.0_dp .or. boundary%drive%turns())) or_edge = ", or an edge of that length along it"
       call refuse(boundary, "a width, with a diameter of the largest grain and the range of the lists, of at most the "// &
         & "period of "//to_text(scene%period%length(d), 4)//" m"//or_edge//", here "//to_text(width, 4)//" m, along")
     end subroutine check_width
@@ -80,7 +80,7 @@ contains
       integer :: k
 
       do k = 1, 3
-        if (boundary%turns_about(k) .and. abs(boundary%surface%axis(k)) < 1.0_dp - straight) &
+        if (boundary%drive%turns_about(k) .and. abs(boundary%surface%axis(k)) < 1.0_dp - straight) &
           & call refuse(boundary, "no rotation but about its axis, near")
       end do
       if (abs(boundary%surface%axis(d)) >= 1.0_dp - straight) return
@@ -125,7 +125,7 @@ contains
 
     turns_across = .false.
     do k = 1, 3
-      if (k /= d .and. boundary%turns_about(k)) turns_across = .true.
+      if (k /= d .and. boundary%drive%turns_about(k)) turns_across = .true.
     end do
   end function turns_across
 

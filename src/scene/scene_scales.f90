@@ -5,7 +5,7 @@ module gravier_scene_scales
   use gravier_boundary, only: boundary_t
   use gravier_physics, only: physics_t
   use gravier_cell_drive, only: cell_drive_t
-  use gravier_velocity_scale, only: imposed_motion_t
+  use gravier_imposed_motion, only: imposed_motion_t, find_imposed
   use gravier_load_areas, only: find_load_areas
   use gravier_simulation, only: simulation_t
   implicit none
@@ -141,12 +141,13 @@ contains
     end do
   end subroutine find_extent
 
-  !> Begin and end of the run, and the rows of all tables between them: what is linear in time is largest at one of these.
+  !> Begin and end of the run, and the rows of all tables between them: what is linear in time is largest at one of these. Of an
+  !> oscillation its first two extremes, in either direction.
   subroutine find_times(simulation, times)
     type(simulation_t), intent(in) :: simulation
     !> in no order [s]
     real(dp), allocatable, intent(out) :: times(:)
-    real(dp) :: end_time
+    real(dp) :: end_time, extreme(2)
     integer :: b, n, room
 
     end_time = simulation%config%time%steps*simulation%config%time%step
@@ -154,9 +155,10 @@ contains
     if (allocated(simulation%gravity_table%time)) room = room + size(simulation%gravity_table%time)
     if (allocated(simulation%cell_drive%table%time)) room = room + size(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
-      associate (table => simulation%decomposition%boundaries(b)%table)
+      associate (table => simulation%decomposition%boundaries(b)%drive%table)
         if (allocated(table%time)) room = room + size(table%time)
       end associate
+      if (simulation%decomposition%boundaries(b)%drive%oscillates()) room = room + 2
     end do
     allocate (times(room), source=0.0_dp)
     times(2) = end_time
@@ -164,9 +166,12 @@ contains
     if (allocated(simulation%gravity_table%time)) call add(simulation%gravity_table%time)
     if (allocated(simulation%cell_drive%table%time)) call add(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
-      associate (table => simulation%decomposition%boundaries(b)%table)
+      associate (table => simulation%decomposition%boundaries(b)%drive%table)
         if (allocated(table%time)) call add(table%time)
       end associate
+      if (.not. simulation%decomposition%boundaries(b)%drive%oscillates()) cycle
+      call simulation%decomposition%boundaries(b)%drive%find_extremes(extreme)
+      call add(extreme)
     end do
 
   contains
@@ -231,7 +236,7 @@ contains
           self%fastest = b
         end if
       end do
-      motion = simulation%velocity_scale%imposed(nd, boundaries, physics)
+      call find_imposed(nd, boundaries, simulation%velocity_scale%lever, simulation%velocity_scale%diameter, physics, motion)
       if (motion%difference > self%drive) then
         self%drive = motion%difference
         call find_rate(self, boundaries, simulation%velocity_scale%lever, extent)

@@ -78,7 +78,7 @@ class Record:
     @functools.cached_property
     def boundary(self):
         """Arrays (states, boundaries, components); none where the scene has no boundaries."""
-        names = ("position", "velocity", "force")
+        names = ("position", "normal", "velocity", "force")
         states = self.read("boundaries", *names)
         return {} if states[-1] is None else {name: np.array([state[name] for state in states]) for name in names}
 

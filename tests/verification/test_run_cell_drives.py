@@ -35,6 +35,21 @@ class CellDrives(CellTestCase):
         run = run_case(merged(LATTICE, constant, {"time": {"steps": 70}, "output": {"checkpoint_every": 33}}), directory=here, options=["--restart"])
         self.assert_status(run, 2)
         self.assertIn("contents of cell.csv are not those with which ", run.stderr)
+        # a table that repeats is the same table written out
+        states = []
+        for name, periods in (("repeated table", 1), ("table written out", 4)):
+            here = self.here(name)
+            os.makedirs(here)
+            text = "time,shear_rate_xy,pressure_y\n0,0.0,1.0\n"
+            for k in range(periods):
+                text += f"{2 * k + 1},0.2,1.5\n{2 * k + 2},0.0,1.0\n"
+            write(os.path.join(here, "cell.csv"), text)
+            run = run_case(merged(LATTICE, constant, {"scene": {"cell_table_repeats": periods == 1}, "time": {"step": 0.125, "steps": 60}}), directory=here)
+            self.assert_status(run, 0)
+            states.append(run.results())
+        for value in ("bodies/position", "cell/edge", "cell/velocity"):
+            np.testing.assert_array_equal(states[0]["/steps/60/" + value], states[1]["/steps/60/" + value], err_msg=value)
+        self.assertGreater(np.abs(states[0]["/steps/60/cell/velocity"]).max(), 0.01)
         # without contacts
         here = self.here("table of rates")
         os.makedirs(here)

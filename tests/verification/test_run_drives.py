@@ -44,6 +44,63 @@ class Moves(SmallScene):
             self.verify(case, "place of the plane [m]", record.boundary["position"][:, 0, 0], way, 1e-13)
         self.both(check)
 
+    def test_oscillation(self):
+        """A plane that moves by A sin(2 pi f t + phase) beside its constant velocity, or beside its table, drives what is glued to
+        nothing: where it is, of second order, and back after each period; about its pivot it turns by the angle in the same manner."""
+        amplitude, frequency, phase = 0.02, 8.0, 0.7
+
+        def check(dimension):
+            along, up = np.eye(dimension)[0], np.eye(dimension)[-1]
+            swing = {"oscillation": floats(amplitude * along), "frequency": frequency, "phase": phase}
+            far = [Grain(3.0 * (along + up), radius=RADIUS)]
+            away, case = {}, f"plane that oscillates, {dimension}D"
+            for steps in (128, 256):
+                for beside, drive in (("velocity", {"velocity": floats(0.25 * along)}), ("table", {"table": "drive.csv"})):
+                    record = self.play(f"oscillates {dimension} {steps} {beside}", far, [plane(0 * along, along, **swing, **drive)], steps=steps,
+                                       time={"step": 0.5 / steps}, files={"drive.csv": "time,vx\n0,0.25\n9,0.25\n"})
+                    t = record.time
+                    angle = 2.0 * np.pi * frequency * t + phase
+                    speed = 0.25 + 2.0 * np.pi * frequency * amplitude * np.cos(angle)
+                    self.verify(case, "speed of the plane [m/s]", record.boundary["velocity"][1:, 0, 0], speed[1:], 1e-12)
+                    way = 0.25 * t + amplitude * (np.sin(angle) - np.sin(phase))
+                    away[beside, steps] = np.abs(record.boundary["position"][:, 0, 0] - way).max()
+                    # four periods
+                    self.verify(case, "place of the plane after whole periods [m]", record.boundary["position"][-1, 0, 0], 0.125, 1e-13)
+                self.assertLess(away["velocity", steps], 2.0 * amplitude * (2.0 * np.pi * frequency * 0.5 / steps) ** 2 / 12.0, case)
+                self.assertLess(abs(away["velocity", steps] - away["table", steps]), 1e-14, case)
+            self.assertGreater(np.log2(away["velocity", 128] / away["velocity", 256]), 1.95, case)
+            turns = [0.3] if dimension == 2 else [0.0, 0.3, 0.0]
+            record = self.play(f"rocks {dimension}", far, [plane(0 * along, along, rotation_oscillation=turns, frequency=frequency)],
+                               steps=256, time={"step": 0.5 / 256})
+            turned = 0.3 * np.sin(2.0 * np.pi * frequency * record.time)
+            normal = record.boundary["normal"][:, 0]
+            self.verify(case, "angle of a plane that rocks [rad]", np.arcsin(-normal[:, -1] if dimension == 3 else normal[:, 1]), turned,
+                        1.01 * 0.3 * (2.0 * np.pi * frequency * 0.5 / 256) ** 2 / 12.0)
+        self.both(check)
+
+    def test_repeats(self):
+        """Tables of a boundary and of gravity that repeat are, bit for bit, the same tables written out. What a boundary and gravity do
+        at the start of such a table, where they are slow, is compared with the speed that they come to."""
+        rows, drive, pull = (0.0, 0.03125, 0.09375, 0.125), (0.0, 1.0, -1.0, 0.0), (-9.0, -11.0, -7.0, -9.0)
+
+        def table(column, values, periods, constant=""):
+            text = "time," + column + "\n"
+            for k in range(periods):
+                text += "".join(f"{time + 0.125 * k!r},{constant}{value!r}\n" for time, value in zip(rows[:3], values))
+            return text + f"{0.125 * periods!r},{constant}{values[3]!r}\n"
+
+        stack = [Grain([0.0, RADIUS * (2 * k + 1)], radius=RADIUS) for k in range(3)]
+        once, often = ({"drive.csv": table("vx", drive, n), "g.csv": table("gx,gy", pull, n, "0.0,")} for n in (1, 8))
+        floor = plane([0.0, 0.0], [0.0, 1.0], friction=0.5, table="drive.csv")
+        repeated = self.play("repeats", stack, [dict(floor, table_repeats=True)], None, 256, time={"step": 1 / 256}, files=once,
+                             scene={"gravity_table": "g.csv", "gravity_table_repeats": True})
+        written = self.play("written out", stack, [floor], None, 256, time={"step": 1 / 256}, files=often, scene={"gravity_table": "g.csv"})
+        np.testing.assert_array_equal(repeated.position, written.position)
+        np.testing.assert_array_equal(repeated.velocity, written.velocity)
+        self.assertGreater(np.abs(repeated.velocity[-100:]).max(), 0.1)
+        # the next row of the table is a speed of 1 m/s, the load of a step 9/256 m/s: never less than that
+        self.assertGreater(repeated.run.history()["velocity_scale"].min(), 6.9 / 256)
+
     def test_belt(self):
         """A block on a belt reaches its speed at u / (mu g)."""
         def check(dimension):

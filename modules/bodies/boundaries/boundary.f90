@@ -4,17 +4,13 @@ module gravier_boundary
   use gravier_kinds, only: dp, i8
   use gravier_rotation, only: make_rotation, rotate, rigid_velocity
   use gravier_contact_coefficients, only: coefficients_t
-  use gravier_time_table, only: time_table_t
+  use gravier_boundary_drive, only: boundary_drive_t
   use gravier_surface, only: surface_t
   use gravier_facet, only: near_facets_t
   use gravier_surface_registry, only: glued_grains
   implicit none
   private
-  public :: boundary_t, drive_names
-
-  !> columns of a table of drives, in 2D and 3D; `drive` knows them by their places
-  character(len=*), parameter :: drives_2d = "vx vy omega fx fy pressure"
-  character(len=*), parameter :: drives_3d = "vx vy vz wx wy wz fx fy fz pressure"
+  public :: boundary_t
 
   !> A boundary. In 2D vectors have a third component of 0, and spins only a third one.
   type :: boundary_t
@@ -32,17 +28,12 @@ module gravier_boundary
     real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
     !> at the start of the step [m/s], [rad/s]
     real(dp) :: last_velocity(3) = 0.0_dp, last_spin(3) = 0.0_dp
-    !> as prescribed, where no table says otherwise [m/s], [rad/s]
-    real(dp) :: given_velocity(3) = 0.0_dp, given_spin(3) = 0.0_dp
-    !> a loop of the user's own has set its drive, so that its spin may jump between two steps
-    logical :: steered = .false.
+    !> its prescribed motion and loads
+    type(boundary_drive_t) :: drive
     !> components of translation that forces move
     logical :: free(3) = .false.
-    !> on the free components [N]; [Pa], or [N/m] in 2D
-    real(dp) :: given_force(3) = 0.0_dp, given_pressure = 0.0_dp
     !> inertia against forces [kg]
     real(dp) :: mass = 0.0_dp
-    type(time_table_t) :: table
     !> with grains
     type(coefficients_t) :: contact
     !> number of its material, 0 for none
@@ -64,8 +55,6 @@ module gravier_boundary
     procedure :: find_place => boundary_find_place
     procedure :: is_driven => boundary_is_driven
     procedure :: is_moved => boundary_is_moved
-    procedure :: turns => boundary_turns
-    procedure :: turns_about => boundary_turns_about
     procedure :: half_width => boundary_half_width
     procedure :: find_image
     procedure :: locate => boundary_locate
@@ -99,14 +88,6 @@ contains
     if (.not. allocated(self%surface)) return
     name = trim(self%surface%is%kind)
   end function boundary_shape_name
-
-  !> Names of the columns of a table of drives, with a blank between two.
-  pure function drive_names(nd) result(names)
-    integer, intent(in) :: nd
-    character(len=:), allocatable :: names
-    names = drives_3d
-    if (nd == 2) names = drives_2d
-  end function drive_names
 
   !> Whether grains can have a contact with its surface.
   pure logical function boundary_touches(self)
@@ -158,33 +139,6 @@ contains
     boundary_is_moved = any(abs(self%velocity) > 0.0_dp .and. .not. self%free) .or. any(abs(self%spin) > 0.0_dp)
   end function boundary_is_moved
 
-  !> Whether it turns, now or later.
-  pure logical function boundary_turns(self)
-    class(boundary_t), intent(in) :: self
-
-    boundary_turns = any(abs(self%given_spin) > 0.0_dp)
-    if (.not. allocated(self%table%has)) return
-    if (size(self%table%has) == 6) then
-      boundary_turns = boundary_turns .or. self%table%has(3)
-    else
-      boundary_turns = boundary_turns .or. any(self%table%has(4:6))
-    end if
-  end function boundary_turns
-
-  !> Whether it turns, now or later, about axis `k`.
-  pure logical function boundary_turns_about(self, k)
-    class(boundary_t), intent(in) :: self
-    integer, intent(in) :: k
-
-    boundary_turns_about = abs(self%given_spin(k)) > 0.0_dp
-    if (.not. allocated(self%table%has)) return
-    if (size(self%table%has) == 6) then
-      boundary_turns_about = boundary_turns_about .or. (k == 3 .and. self%table%has(3))
-    else
-      boundary_turns_about = boundary_turns_about .or. self%table%has(3 + k)
-    end if
-  end function boundary_turns_about
-
   !> The point that its shape names; of glued grains, the pivot [m].
   pure subroutine boundary_find_place(self, place)
     class(boundary_t), intent(in) :: self
@@ -198,7 +152,7 @@ contains
   pure real(dp) function boundary_half_width(self, d) result(half)
     class(boundary_t), intent(in) :: self
     integer, intent(in) :: d
-    half = self%surface%half_width(d, self%turns())
+    half = self%surface%half_width(d, self%drive%turns())
   end function boundary_half_width
 
   !> The image of a point that is nearest to the middle of a surface that ends, or to the pivot of glued grains. What is endless
@@ -255,7 +209,7 @@ contains
     near%n = 0
     seen = 0
     call find_image(self, x, image)
-    images(:) = merge(1, 0, self%period > 0.0_dp .and. .not. self%turns())
+    images(:) = merge(1, 0, self%period > 0.0_dp .and. .not. self%drive%turns())
     do k = -images(3), images(3)
       do j = -images(2), images(2)
         do i = -images(1), images(1)
@@ -332,27 +286,12 @@ contains
     integer :: d
 
     do d = 1, nd
-      if (.not. self%free(d)) self%velocity(d) = drive(self, d, time, self%given_velocity(d))
+      if (.not. self%free(d)) self%velocity(d) = self%drive%velocity_at(d, time)
     end do
-    if (nd == 2) then
-      self%spin(3) = drive(self, 3, time, self%given_spin(3))
-    else
-      do d = 1, 3
-        self%spin(d) = drive(self, 3 + d, time, self%given_spin(d))
-      end do
-    end if
+    do d = merge(3, 1, nd == 2), 3
+      self%spin(d) = self%drive%spin_at(d, time)
+    end do
   end subroutine boundary_prescribe
-
-  !> A prescribed quantity: column `k` of the table where it has it, else the constant.
-  pure real(dp) function drive(self, k, time, constant) result(value)
-    class(boundary_t), intent(in) :: self
-    integer, intent(in) :: k
-    real(dp), intent(in) :: time, constant
-
-    value = constant
-    if (.not. allocated(self%table%has)) return
-    if (self%table%has(k)) value = self%table%at(k, time)
-  end function drive
 
   !> Force of the user on the free components at a time [N].
   pure subroutine boundary_applied_force(self, nd, time, area, force)
@@ -370,8 +309,7 @@ contains
     if (allocated(self%surface)) normal(:) = self%surface%axis
     do d = 1, nd
       if (.not. self%free(d)) cycle
-      force(d) = drive(self, merge(3, 6, nd == 2) + d, time, self%given_force(d)) + &
-        & drive(self, merge(6, 10, nd == 2), time, self%given_pressure)*area*normal(d)
+      force(d) = self%drive%force_at(d, time) + self%drive%pressure_at(time)*area*normal(d)
     end do
   end subroutine boundary_applied_force
 
@@ -387,7 +325,7 @@ contains
     end if
     axis = findloc(self%free, .true., dim=1)
     do d = axis + 1, 3
-      if (self%free(d) .and. abs(self%given_force(d)) > abs(self%given_force(max(axis, 1)))) axis = d
+      if (self%free(d) .and. abs(self%drive%force(d)) > abs(self%drive%force(max(axis, 1)))) axis = d
     end do
     axis = max(axis, 1)
   end function boundary_load_axis

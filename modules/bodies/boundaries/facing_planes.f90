@@ -2,6 +2,7 @@
 module gravier_facing_planes
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
+  use gravier_boundary_drive, only: drives_pressure
   implicit none
   private
   public :: find_facing_planes, faces_along, open_axis, is_pressed
@@ -68,12 +69,10 @@ contains
   end function open_axis
 
   !> Whether a pressure acts on a boundary at some time, by a key or by a table.
-  pure logical function is_pressed(boundary, nd)
+  pure logical function is_pressed(boundary)
     type(boundary_t), intent(in) :: boundary
-    integer, intent(in) :: nd
 
-    is_pressed = abs(boundary%given_pressure) > 0.0_dp
-    if (allocated(boundary%table%has)) is_pressed = is_pressed .or. boundary%table%has(merge(6, 10, nd == 2))
+    is_pressed = abs(boundary%drive%pressure) > 0.0_dp .or. boundary%drive%gives(drives_pressure, 1)
   end function is_pressed
 
 end module gravier_facing_planes

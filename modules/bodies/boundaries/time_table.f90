@@ -1,4 +1,5 @@
-!> Quantities given in a table against time: linear between the rows, constant before the first and after the last.
+!> Quantities given in a table against time: linear between the rows, and constant before the first and after the last or begun
+!> anew there.
 module gravier_time_table
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -17,9 +18,12 @@ module gravier_time_table
     real(dp), allocatable :: value(:, :)
     !> whether the file has the column (columns asked for)
     logical, allocatable :: has(:)
+    !> time from the first row to the last, after which the table begins anew; 0 where it does not [s]
+    real(dp) :: period = 0.0_dp
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
+    procedure :: beside => time_table_beside
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
     procedure :: digest => time_table_digest
@@ -29,11 +33,13 @@ contains
 
   !> Read the columns `names` of a file, as far as it has them. Failure: status_input, with file, line, column and what
   !> was expected. Not collective.
-  subroutine time_table_read(self, path, names, error)
+  subroutine time_table_read(self, path, names, repeats, error)
     class(time_table_t), intent(inout) :: self
     character(len=*), intent(in) :: path
     !> of the columns besides time, with a blank between two
     character(len=*), intent(in) :: names
+    !> whether the table begins anew after its last row, which then has to be as the first
+    logical, intent(in) :: repeats
     type(error_t), allocatable, intent(inout) :: error
     type(csv_table_t) :: table
     integer, allocatable :: column(:)
@@ -55,8 +61,29 @@ contains
     if (.not. any(self%has)) call table%refuse_file("no column besides time; known are "//names, error)
     allocate (self%time(0), self%value(size(column), 0))
     call read_rows(self, table, time_column, column, error)
+    self%period = 0.0_dp
+    if (repeats) call join_ends(self, table, error)
     call table%close()
   end subroutine time_table_read
+
+  !> Let the table begin anew after its last row.
+  subroutine join_ends(self, table, error)
+    type(time_table_t), intent(inout) :: self
+    type(csv_table_t), intent(inout) :: table
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    if (allocated(error)) return
+    n = size(self%time)
+    if (n < 2) then
+      call table%refuse_file("a table that repeats has one row; expected two or more", error)
+    else if (any(abs(self%value(:, n) - self%value(:, 1)) > 0.0_dp)) then
+      call table%refuse_file("a table that repeats ends with another row than it begins with; expected the values of the first "// &
+        & "row in the last", error)
+    else
+      self%period = self%time(n) - self%time(1)
+    end if
+  end subroutine join_ends
 
   !> Places of columns in the table, 0 for those that it does not have.
   subroutine find_columns(table, names, column)
@@ -147,28 +174,58 @@ contains
     integer, intent(in) :: k
     !> [s]
     real(dp), intent(in) :: time
-    integer :: low, high, middle
+    integer :: low, high
     real(dp) :: share
+
+    call find_rows(self, time, low, high, share)
+    value = self%value(k, low)
+    if (high > low) value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
+  end function time_table_at
+
+  !> Value of column `k` in the row before a time, or in the row after it.
+  pure real(dp) function time_table_beside(self, k, time, side) result(value)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: time
+    !> -1: before, 1: after
+    integer, intent(in) :: side
+    integer :: low, high
+    real(dp) :: share
+
+    call find_rows(self, time, low, high, share)
+    value = self%value(k, merge(low, high, side < 0))
+  end function time_table_beside
+
+  !> The rows between which a time lies, twice the same row outside of the table, and how far it is from the first to the second.
+  pure subroutine find_rows(self, time, low, high, share)
+    type(time_table_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+    integer, intent(out) :: low, high
+    !> between 0 and 1
+    real(dp), intent(out) :: share
+    integer :: middle
+    real(dp) :: at
 
     low = 1
     high = size(self%time)
-    if (time <= self%time(low)) then
-      value = self%value(k, low)
-    else if (time >= self%time(high)) then
-      value = self%value(k, high)
-    else
-      do while (high - low > 1)
-        middle = (low + high)/2
-        if (self%time(middle) <= time) then
-          low = middle
-        else
-          high = middle
-        end if
-      end do
-      share = (time - self%time(low))/(self%time(high) - self%time(low))
-      value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
-    end if
-  end function time_table_at
+    share = 0.0_dp
+    at = time
+    if (self%period > 0.0_dp) at = self%time(low) + modulo(time - self%time(low), self%period)
+    if (at <= self%time(low)) high = low
+    if (at >= self%time(size(self%time))) low = high
+    if (high == low) return
+    do while (high - low > 1)
+      middle = (low + high)/2
+      if (self%time(middle) <= at) then
+        low = middle
+      else
+        high = middle
+      end if
+    end do
+    share = (at - self%time(low))/(self%time(high) - self%time(low))
+  end subroutine find_rows
 
   !> Whether some quantity has another value later than it has at a time. The table has been read.
   pure logical function time_table_changes_after(self, time) result(changes)
@@ -181,7 +238,7 @@ contains
     do k = 1, size(self%has)
       if (.not. self%has(k)) cycle
       do row = size(self%time), 1, -1
-        if (.not. self%time(row) > time) exit
+        if (.not. (self%time(row) > time .or. self%period > 0.0_dp)) exit
         changes = changes .or. abs(self%value(k, row) - self%at(k, time)) > 0.0_dp
       end do
     end do

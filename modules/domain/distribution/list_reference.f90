@@ -41,7 +41,7 @@ contains
     if (.not. allocated(reference)) then
       reference = boundaries
       do b = 1, size(reference)
-        associate (table => reference(b)%table)
+        associate (table => reference(b)%drive%table)
           if (allocated(table%has)) deallocate (table%time, table%value, table%has)
         end associate
       end do

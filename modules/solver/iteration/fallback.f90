@@ -17,9 +17,15 @@ module gravier_fallback
   public :: fallback_t, fallback_words, fallback_record
 
   !> Most iterations of the second method. Tens of factorisations bring most solves to their goal. Where friction leaves velocities
-  !> undetermined, thousands of iterations do not help either. A solve that ended at `max_iterations` is taken over if it made at
-  !> least so many itself; a smaller limit is one that the user has set on purpose.
+  !> undetermined, thousands of iterations do not help either.
   integer, parameter :: most_iterations = 2000
+  !> Iterations that may gain nothing: so many over the number of contacts, at least and at most. A factorisation of 8000 contacts
+  !> in space takes half a second, as thousands of sweeps do.
+  real(dp), parameter :: patience = 4.0e5_dp
+  integer, parameter :: shortest = 40, longest = 1000
+  !> A solve that ended at `max_iterations` is taken over if it made at least so many iterations itself; a smaller limit is one that
+  !> the user has set on purpose.
+  integer, parameter :: least_tried = 2000
 
   !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
   integer, parameter :: fallback_words = 1 + backoff_words
@@ -73,6 +79,7 @@ contains
     again = control
     again%layered = .false.
     again%figure_ratio = 0.0_dp
+    again%patience = max(shortest, nint(min(real(longest, dp), patience/real(max(problem%n_contacts, 1_i8), dp))))
     again%max_iterations = min(most_iterations, control%max_iterations)
     call copy_impulses(problem, kept)
     call solve_contacts(problem, self%method, again, second, error, exact, watch)
@@ -95,7 +102,7 @@ contains
   !> Whether more iterations of the first method promise nothing.
   pure logical function has_failed(report)
     type(solve_report_t), intent(in) :: report
-    has_failed = report%status == solve_stagnated .or. (report%status == solve_exhausted .and. report%iterations >= most_iterations)
+    has_failed = report%status == solve_stagnated .or. (report%status == solve_exhausted .and. report%iterations >= least_tried)
   end function has_failed
 
   !> Whether the second solve has ended nearer to the goal than the first.

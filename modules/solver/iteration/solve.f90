@@ -60,6 +60,7 @@ contains
 
     call prepare(state, problem, method, control, report, error)
     if (allocated(error)) return
+    state%stagnation%patience = control%patience
     call check(state, problem, method, control, report, done, exact)
     state%schedule%settled = state%by_estimate .and. report%residual <= control%tolerance
     call state%fresh%init(problem, control%tolerance)
@@ -360,7 +361,7 @@ contains
     call state%stagnation%judge(problem, report%iterations, state%velocity%levels%most_depth, has_stagnated, in_vain)
     if (in_vain) then
       report%status = solve_unbounded
-    else if (has_stagnated .and. method%persists) then
+    else if (has_stagnated .and. method%persists .and. control%patience == 0) then
       has_stagnated = .false.
       call state%stagnation%go_on(problem, report%iterations)
     else if (has_stagnated .and. method%acceleration%extrapolates() .and. &

@@ -29,6 +29,8 @@ module gravier_solve_report
     !> iterations between two checks; of these, some that would tell nothing new are left out. Accelerated sweeps have their sums
     !> after each iteration, and are checked as soon as these indicate convergence
     integer :: check_every = 10
+    !> iterations without gain after which a method of direct solves has stagnated; 0: those of sweeps
+    integer :: patience = 0
     !> keep the figures of every check, and leave none out
     logical :: trace = .false.
     !> try a start that carries loads across layers

@@ -27,6 +27,8 @@ module gravier_stagnation
   integer, parameter :: waves = 6
 
   type :: stagnation_t
+    !> iterations without gain of a method that does not carry loads by waves, as direct solves; 0 of sweeps
+    integer :: patience = 0
     !> lowest figure and lowest velocity error so far; iteration from which on the solve is looked at
     real(dp), private :: best(2) = huge(1.0_dp)
     integer, private :: next_look = 0
@@ -57,10 +59,16 @@ contains
     !> the residual where it is above its tolerance, else 0
     real(dp), intent(in) :: missing_residual
     logical, intent(out) :: due
+    integer :: watched
 
     due = .false.
     if (any(figures < gained*self%best)) then
       where (figures < gained*self%best) self%best = figures
+      if (self%patience > 0) then
+        self%next_look = 2*iteration + self%patience
+        self%kept_at = 0
+        return
+      end if
       if (.not. self%is_last) then
         self%next_look = 2*iteration + merge(patience, plain_patience, accelerated)
         if (missing_residual > 0.0_dp .and. missing_residual < small_residual) &
@@ -69,8 +77,10 @@ contains
         return
       end if
     end if
-    if (self%kept_at == 0 .and. iteration >= self%next_look - watch) call keep_impulses(self, problem, iteration)
-    due = iteration >= self%next_look .and. self%kept_at > 0 .and. iteration - self%kept_at >= watch
+    watched = watch
+    if (self%patience > 0) watched = self%patience/2
+    if (self%kept_at == 0 .and. iteration >= self%next_look - watched) call keep_impulses(self, problem, iteration)
+    due = iteration >= self%next_look .and. self%kept_at > 0 .and. iteration - self%kept_at >= watched
   end subroutine stagnation_note
 
   subroutine keep_impulses(self, problem, iteration)
@@ -94,7 +104,7 @@ contains
     logical, intent(out) :: stagnates, in_vain
 
     in_vain = .false.
-    stagnates = iteration >= waves*depth
+    stagnates = self%patience > 0 .or. iteration >= waves*depth
     if (stagnates) in_vain = are_in_vain(problem, self%kept)
   end subroutine stagnation_judge
 
@@ -124,7 +134,7 @@ contains
     integer, intent(in) :: iteration
     !> of the problem, in contacts
     integer, intent(in) :: depth
-    may_begin = .not. self%is_last .and. real(depth, dp)**2 <= waves*real(plain_patience + iteration, dp)
+    may_begin = self%patience == 0 .and. .not. self%is_last .and. real(depth, dp)**2 <= waves*real(plain_patience + iteration, dp)
   end function stagnation_may_begin_last
 
   !> The method goes on in another way, by plain iterations, which have as many as the solve has had, and some more. They are slow

@@ -80,7 +80,7 @@ contains
       sub%pair(:, c) = pair(:, this%f)
       call take_terms(view, found, boundaries, physics%laws, before, this)
       if (this%b > 0) then
-        if (boundaries(this%b)%turns()) call add_column(view, found, boundaries(this%b), physics, this, sub, start)
+        if (boundaries(this%b)%drive%turns()) call add_column(view, found, boundaries(this%b), physics, this, sub, start)
       end if
       if (physics%cell%moves) call pack_image(view, this, sub)
       call pack_terms(view, found, kernels, physics%h, this, sub)
@@ -176,7 +176,7 @@ contains
       j = view%list%antagonist(p)
       b = found%boundary(f)
       if (b > 0) then
-        column = merge(sub%n_bodies + 1, numbers%of_boundary(b), boundaries(b)%turns())
+        column = merge(sub%n_bodies + 1, numbers%of_boundary(b), boundaries(b)%drive%turns())
         pair(1, f) = merge(column, numbers%of_grain(i), view%bodies%glued(i) > 0)
         pair(2, f) = column
         if (view%bodies%glued(i) > 0) pair(2, f) = numbers%of_grain(j)
@@ -309,7 +309,7 @@ contains
       if (b <= sub%n_grains) start(kernels%nd + 1:, b) = sub%v_free(kernels%nd + 1:, b)
     end do
     do k = 1, size(boundaries)
-      if (numbers%of_boundary(k) == 0 .or. boundaries(k)%turns()) cycle
+      if (numbers%of_boundary(k) == 0 .or. boundaries(k)%drive%turns()) cycle
       start(1:kernels%nd, numbers%of_boundary(k)) = boundaries(k)%last_velocity(1:kernels%nd)
     end do
   end subroutine find_start_velocities

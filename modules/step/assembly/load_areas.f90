@@ -104,7 +104,7 @@ contains
 
     do b = 1, size(decomposition%boundaries)
       associate (boundary => decomposition%boundaries(b))
-        if (.not. (boundary%present .and. boundary%is_plane() .and. is_pressed(boundary, decomposition%nd))) cycle
+        if (.not. (boundary%present .and. boundary%is_plane() .and. is_pressed(boundary))) cycle
         do d = 1, decomposition%nd
           if (d == boundary%load_axis() .or. decomposition%period%length(d) > 0.0_dp) cycle
           call find_facing_planes(decomposition%boundaries, d, boundary%surface%point, low, high)

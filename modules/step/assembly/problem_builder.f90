@@ -89,7 +89,7 @@ contains
         b = found%boundary(c)
         if (b == 0) cycle
         numbers%of_boundary(b) = 1
-        if (boundaries(b)%turns()) n = n + 1
+        if (boundaries(b)%drive%turns()) n = n + 1
       end do
       sub%n_contacts = found%n
       sub%overlapping_cores = found%overlapping_cores
@@ -103,7 +103,7 @@ contains
       end do
       sub%n_columns = sub%n_bodies
       do b = 1, size(boundaries)
-        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%is_driven() .or. boundaries(b)%turns()) cycle
+        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%is_driven() .or. boundaries(b)%drive%turns()) cycle
         sub%n_columns = sub%n_columns + 1
         numbers%of_boundary(b) = sub%n_columns
       end do
@@ -116,7 +116,7 @@ contains
       call pack_grains(view, numbers%of_grain, decomposition%figures, kernels, physics, sub)
       if (physics%cell%moves) call pack_places(view, numbers%of_grain, sub)
       do b = 1, size(boundaries)
-        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%turns()) cycle
+        if (numbers%of_boundary(b) == 0 .or. boundaries(b)%drive%turns()) cycle
         call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
       end do
     end associate

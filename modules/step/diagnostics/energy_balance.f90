@@ -156,7 +156,7 @@ contains
       earlier(b) = step%decomposition%boundaries(b)
       call earlier(b)%prescribe(step%decomposition%nd, step%time)
       earlier(b)%velocity(:) = earlier(b)%last_velocity
-      if (earlier(b)%steered) earlier(b)%spin(:) = earlier(b)%last_spin
+      if (earlier(b)%drive%steered) earlier(b)%spin(:) = earlier(b)%last_spin
     end do
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
@@ -332,7 +332,7 @@ contains
         call find_touched_point(step, s, c, k, point)
         call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
         ! what the end of the step has of the travel of the body (add_travel), its start lacks
-        if (earlier(sub%boundary(column))%turns()) then
+        if (earlier(sub%boundary(column))%drive%turns()) then
           call step%decomposition%boundaries(sub%boundary(column))%velocity_at(point, now)
           start(1:nd, column) = start(1:nd, column) - (sub%v_global(1:nd, column) - now)
         end if

@@ -9,12 +9,16 @@ module gravier_run_tally
     & solve_unbounded
   implicit none
   private
-  public :: run_tally_t, relative_error, far_off, often_mended
+  public :: run_tally_t, relative_error, far_off, often_mended, most_drift
 
   !> velocity error over its scale beyond which the accuracy of a step counts as unknown
   real(dp), parameter :: far_off = 0.5_dp
   !> share of the steps with projected overlaps beyond which results are not those of the contact law
   real(dp), parameter :: often_mended = 0.1_dp
+  !> errors of its solve below which the motion of a step is not told from them
+  real(dp), parameter :: unresolved_times = 2.0_dp
+  !> diameters by which grains may move in the steps whose motion is not told from the errors of their solves
+  real(dp), parameter :: most_drift = 0.01_dp
   !> times the overlap of the first step, or the overlap that is allowed, from which on overlaps have grown
   real(dp), parameter :: grown = 2.0_dp
   !> kinds of velocity scales that are told apart
@@ -30,6 +34,9 @@ module gravier_run_tally
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
+    !> steps whose motion is not told from the errors of their solves, and the path of the free grains in these, a mean [m]
+    integer(i8) :: unresolved = 0
+    real(dp) :: drift = 0.0_dp
     !> largest overlap of the first step, which is that of the start, and of all later steps [m]
     real(dp) :: start_overlap = 0.0_dp, later_overlap = 0.0_dp
     !> of compliant contacts: largest deformation [m], largest product of the step and the frequency of a normal spring
@@ -130,7 +137,7 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path)
+  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path, h)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
@@ -140,6 +147,8 @@ contains
     logical, intent(in) :: mended
     !> means over the free grains [m]
     real(dp), intent(in) :: shift, path
+    !> length of the step, whose solve has been added [s]
+    real(dp), intent(in) :: h
 
     self%steps = self%steps + 1
     if (self%steps == 1) then
@@ -156,6 +165,10 @@ contains
     self%most_stretched = max(self%most_stretched, statistics%stretched_bonds)
     self%shift = self%shift + shift
     self%path = self%path + path
+    if (path > 0.0_dp .and. path < unresolved_times*h*self%velocity_error) then
+      self%unresolved = self%unresolved + 1
+      self%drift = self%drift + min(path, h*self%velocity_error)
+    end if
   end subroutine run_tally_add_step
 
   !> Solves that missed their criterion.

@@ -16,19 +16,26 @@ contains
     type(boundary_t), intent(in) :: boundaries(:)
     !> (boundaries) [m]
     real(dp), intent(out) :: lever(:)
-    real(dp) :: place(3), corner(3, 8)
-    integer :: b, k, n
+    real(dp) :: place(3), corner(3, 8), facet(3, 3)
+    integer :: b, k, c, n
 
     lever(:) = 0.0_dp
     do b = 1, size(boundaries)
       associate (boundary => boundaries(b))
-        if (.not. boundary%turns()) cycle
+        if (.not. boundary%drive%turns()) cycle
         if (boundary%is_glued() .or. boundary%is_plane()) then
           do k = 1, grains%n
             if (boundary%is_glued() .and. grains%glued(k) /= b) cycle
             place(:) = 0.0_dp
             place(1:grains%nd) = grains%position(:, k)
             lever(b) = max(lever(b), arm(boundary, place) + grains%radius(k))
+          end do
+        else if (boundary%is_faceted()) then
+          do k = 1, boundary%surface%n_facets()
+            call boundary%surface%get_facet(k, facet(:, 1:grains%nd))
+            do c = 1, grains%nd
+              lever(b) = max(lever(b), arm(boundary, facet(:, c)))
+            end do
           end do
         else
           associate (surface => boundary%surface)
@@ -42,17 +49,15 @@ contains
     end do
   end subroutine find_levers
 
-  !> Distance of a point from the axis through the pivot, or from the pivot where only a table knows the axis [m].
+  !> Distance of a point from the axis through the pivot; from the pivot where a table or an oscillation may change the axis [m].
   pure real(dp) function arm(boundary, place)
     type(boundary_t), intent(in) :: boundary
     real(dp), intent(in) :: place(3)
     real(dp) :: way(3), axis(3)
 
     way(:) = place - boundary%pivot
-    if (norm2(boundary%given_spin) > 0.0_dp) then
-      axis(:) = boundary%given_spin/norm2(boundary%given_spin)
-      way(:) = way - sum(way*axis)*axis
-    end if
+    call boundary%drive%find_axis(axis)
+    way(:) = way - sum(way*axis)*axis
     arm = norm2(way)
   end function arm
 

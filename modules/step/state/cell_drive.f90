@@ -119,7 +119,28 @@ contains
       motion%free = motion%before - volume*motion%impulse/motion%inertia
     end where
     motion%now(:, :) = motion%free
+    if (allocated(self%table%has)) motion%fastest = fastest_beside(self, nd, time)
   end subroutine cell_drive_begin_step
+
+  !> Norm of the rates that are given, the larger one of the rows of the table before and after a time [1/s].
+  pure real(dp) function fastest_beside(self, nd, time) result(fastest)
+    type(cell_drive_t), intent(in) :: self
+    integer, intent(in) :: nd
+    !> [s]
+    real(dp), intent(in) :: time
+    real(dp) :: rate(3, 3)
+    integer :: k, side
+
+    fastest = 0.0_dp
+    do side = -1, 1, 2
+      rate(:, :) = merge(0.0_dp, self%rate, self%driven)
+      do k = 1, cell_components(nd)
+        if (self%table%has(k)) rate(component_row(cell_component(k, nd)), component_column(cell_component(k, nd))) = &
+          & self%table%beside(k, time, side)
+      end do
+      fastest = max(fastest, norm2(rate))
+    end do
+  end function fastest_beside
 
   !> The motion of the cell under the impulses of a solve, which carries the grains in contact along. Collective.
   subroutine take_cell(problem, period)

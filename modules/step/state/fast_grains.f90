@@ -83,7 +83,7 @@ contains
       associate (boundary => decomposition%boundaries(b))
         speed = max(norm2(boundary%velocity), norm2(boundary%last_velocity)) + &
           & max(norm2(boundary%spin), norm2(boundary%last_spin))*norm2(max(abs(low - boundary%pivot), abs(high - boundary%pivot)))
-        if (h*speed <= least_way*least .and. .not. any(boundary%period > 0.0_dp .and. boundary%turns())) cycle
+        if (h*speed <= least_way*least .and. .not. any(boundary%period > 0.0_dp .and. boundary%drive%turns())) cycle
       end associate
       n = n + 1
       found(n) = b

@@ -5,7 +5,8 @@
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
 !>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
 !>            root mean square of what applied forces add to velocities; of attractions, where there is no other load
-!>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d
+!>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; while a drive starts or
+!>            turns round, as soon as it comes to its next row or to a quarter of its period
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
 !>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
@@ -26,12 +27,13 @@ module gravier_velocity_scale
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_boundary_levers, only: find_levers
+  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: velocity_scale_t, imposed_motion_t
+  public :: velocity_scale_t
 
   !> share of the motion that goes on which an error may be compared with
   real(dp), parameter :: share_of_own = 0.3_dp
@@ -51,16 +53,6 @@ module gravier_velocity_scale
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
-
-  !> What boundaries impose on the grains at a time.
-  type :: imposed_motion_t
-    !> largest difference of velocities [m/s]
-    real(dp) :: difference = 0.0_dp
-    !> velocity of all boundaries where they move alike, else 0 [m/s]
-    real(dp), private :: common(3) = 0.0_dp
-    !> there is a boundary that grains touch
-    logical, private :: bounded = .false.
-  end type imposed_motion_t
 
   type :: velocity_scale_t
     !> what can be meant by the velocity of a scene, and which velocity counts [m/s]
@@ -88,7 +80,6 @@ module gravier_velocity_scale
     procedure :: measure => velocity_scale_measure
     procedure :: load_of => velocity_scale_load_of
     procedure :: pressure_of => velocity_scale_pressure_of
-    procedure :: imposed => velocity_scale_imposed
     procedure, private :: choose => velocity_scale_choose
   end type velocity_scale_t
 
@@ -148,8 +139,9 @@ contains
     logical :: idle
     integer :: s
 
-    motion = self%imposed(decomposition%nd, decomposition%boundaries, physics)
-    self%drive = motion%difference
+    call find_imposed(decomposition%nd, decomposition%boundaries, self%lever, self%diameter, physics, motion)
+    self%drive = largest_imposed(decomposition%nd, decomposition%boundaries, self%lever, self%diameter, physics, &
+      & time, motion)
     self%restitution = physics%laws%most_restitution
     self%load = self%load_of(decomposition%nd, decomposition%boundaries, physics, time, area)
     idle = .not. (self%load > 0.0_dp .or. self%drive > 0.0_dp)
@@ -186,7 +178,8 @@ contains
     call set_concerns(self, physics, motion%common, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
-    if (self%drive > 0.0_dp) problem%drive_scale = max(self%drive, self%creep)
+    ! what a drive that starts carries is not at rest: here the present velocities count
+    if (motion%difference > 0.0_dp) problem%drive_scale = max(motion%difference, self%creep)
   end subroutine velocity_scale_measure
 
   !> Squares of the impulses of attraction and their number.
@@ -404,49 +397,6 @@ contains
     call boundary%applied_force(nd, time, area, force)
     pressure = norm2(force)/area
   end function velocity_scale_pressure_of
-
-  !> What boundaries impose with the velocities that they have. Velocities differ by axis, over the boundaries that no force
-  !> moves along it; rest is one of them where a single boundary is prescribed, and where there is gravity, whose direction a
-  !> box that is shaken does not take along.
-  pure type(imposed_motion_t) function velocity_scale_imposed(self, nd, boundaries, physics) result(motion)
-    class(velocity_scale_t), intent(in) :: self
-    integer, intent(in) :: nd
-    type(boundary_t), intent(in) :: boundaries(:)
-    type(physics_t), intent(in) :: physics
-    real(dp) :: low(nd), high(nd), turning
-    integer :: b, d, n
-
-    low(:) = huge(1.0_dp)
-    high(:) = -huge(1.0_dp)
-    turning = 0.0_dp
-    n = 0
-    do b = 1, size(boundaries)
-      associate (boundary => boundaries(b))
-        if (.not. boundary%present .or. boundary%lets_out()) cycle
-        motion%bounded = .true.
-        if (.not. all(boundary%free(1:nd))) n = n + 1
-        do d = 1, nd
-          if (boundary%free(d)) cycle
-          low(d) = min(low(d), boundary%velocity(d))
-          high(d) = max(high(d), boundary%velocity(d))
-        end do
-        turning = max(turning, norm2(boundary%spin)*self%lever(b))
-      end associate
-    end do
-    motion%difference = norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*self%diameter
-    if (n == 0) return
-    do d = 1, nd
-      ! along an axis along which forces move all, nothing is imposed
-      if (low(d) > high(d)) low(d) = 0.0_dp
-      high(d) = max(low(d), high(d))
-    end do
-    if (.not. (turning > 0.0_dp .or. any(high > low))) motion%common(1:nd) = low
-    if (n == 1 .or. any(abs(physics%gravity(1:nd)) > 0.0_dp)) then
-      low(:) = min(low, 0.0_dp)
-      high(:) = max(high, 0.0_dp)
-    end if
-    motion%difference = max(norm2(high - low), turning)
-  end function velocity_scale_imposed
 
   !> The rule.
   pure subroutine velocity_scale_choose(self)

@@ -555,7 +555,7 @@ contains
     allocate (decomposition%boundaries(3))
     associate (floor => decomposition%boundaries(1), lid => decomposition%boundaries(2))
       floor = plane(11, [0.0_dp, 0.0_dp], [0.0_dp, 1.0_dp])
-      floor%given_spin(3) = 2.0_dp
+      floor%drive%spin(3) = 2.0_dp
       floor%spin(3) = 2.0_dp
       floor%velocity(1) = 0.5_dp
       floor%last_velocity(2) = 0.3_dp
@@ -574,7 +574,7 @@ contains
     glue%contact%friction = 0.3_dp
     glue%contact%restitution = 0.5_dp
     glue%pivot(1) = 0.8_dp
-    if (turning) glue%given_spin(3) = 1.0_dp
+    if (turning) glue%drive%spin(3) = 1.0_dp
     if (turning) glue%spin(3) = 1.0_dp
     decomposition%boundaries(3) = glue
     call make_decomposition(comm, cloud, n_subdomains, 3, .false., decomposition)

@@ -13,6 +13,8 @@ program test_velocity_scale
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_test_scenes, only: plane, change_shape
   use gravier_boundary_levers, only: find_levers
+  use gravier_physics, only: physics_t
+  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -55,6 +57,7 @@ program test_velocity_scale
   call start_parallel()
   call comm%init()
   call alone%init(MPI_COMM_SELF)
+  call test_turning_round()
   call test_levers()
   do nd = 2, 3
     call test_loads(nd)
@@ -133,15 +136,15 @@ contains
       boundaries(b)%surface%edge(:, 2) = [0.0_dp, 0.0_dp, 1.0_dp]
       boundaries(b)%pivot(:) = [0.0_dp, 0.0_dp, 5.0_dp]
     end do
-    boundaries(1)%given_spin(3) = -2.0_dp
+    boundaries(1)%drive%spin(3) = -2.0_dp
     boundaries(2) = plane(2, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp, 1.0_dp])
-    boundaries(2)%given_spin(3) = 1.0_dp
-    boundaries(3)%given_spin(1) = 1.0_dp
+    boundaries(2)%drive%spin(3) = 1.0_dp
+    boundaries(3)%drive%spin(1) = 1.0_dp
     ! vx vy vz, wx wy wz, fx fy fz, pressure
-    allocate (boundaries(4)%table%has(10), source=.false.)
-    boundaries(4)%table%has(6) = .true.
+    allocate (boundaries(4)%drive%table%has(10), source=.false.)
+    boundaries(4)%drive%table%has(5:6) = .true.
     boundaries(5) = boundaries(2)
-    boundaries(5)%given_spin(:) = 0.0_dp
+    boundaries(5)%drive%spin(:) = 0.0_dp
     call grains%init(body_layout_t(3, 6, 0), 2)
     grains%mass(:) = 1.0_dp
     grains%radius(1) = 0.5_dp
@@ -157,10 +160,96 @@ contains
     call check_close(scale%lever(1), 5.0_dp, rounding, "lever of a rectangle that turns")
     call check_close(scale%lever(2), 10.5_dp, rounding, "lever of a plane: the farthest grain")
     call check_close(scale%lever(3), 2.25_dp, rounding, "lever of glued grains: the farthest of them")
-    call check_close(scale%lever(4), sqrt(34.0_dp), rounding, "lever about an axis that a table knows")
+    call check_close(scale%lever(4), sqrt(34.0_dp), rounding, "lever about axes that a table knows")
+    call check_close(lever_of_mesh(), 5.0_dp, rounding, "lever of a mesh about the axis of a table: its farthest corner")
     call check_close(scale%lever(5), 0.0_dp, 0.0_dp, "what does not turn has none")
     call check_close(scale%diameter, 0.75_dp, rounding, "mean diameter")
   end subroutine test_levers
+
+  !> Lever of a triangle that turns about the third axis by a table.
+  real(dp) function lever_of_mesh() result(lever)
+    type(boundary_t) :: boundaries(1)
+    type(body_set_t) :: grains
+    real(dp) :: found(1), facet(3, 3, 1)
+
+    call grains%init(body_layout_t(3, 6, 0), 0)
+    facet(:, 1, 1) = [3.0_dp, 0.0_dp, 0.0_dp]
+    facet(:, 2, 1) = [0.0_dp, 4.0_dp, 0.0_dp]
+    facet(:, 3, 1) = [3.0_dp, 4.0_dp, 90.0_dp]
+    call change_shape("mesh", boundaries(1))
+    boundaries(1)%surface%edge(1, 1) = 1.0_dp
+    boundaries(1)%surface%edge(2, 2) = 1.0_dp
+    call boundaries(1)%surface%take_facets(facet)
+    allocate (boundaries(1)%drive%table%has(10), source=.false.)
+    boundaries(1)%drive%table%has(6) = .true.
+    call find_levers(grains, boundaries, found)
+    lever = found(1)
+  end function lever_of_mesh
+
+  !> What is imposed where drives turn round: the velocities of the oscillation a quarter of a period later, or of the next row of a
+  !> table; of planes that go together without gravity nothing, at any time; of a cell the rates of the rows of its table.
+  subroutine test_turning_round()
+    real(dp), parameter :: lever(2) = 0.0_dp, two_pi = 8.0_dp*atan(1.0_dp)
+    type(boundary_t) :: boundaries(2)
+    type(physics_t) :: physics
+    type(imposed_motion_t) :: now
+    integer :: b
+
+    do b = 1, 2
+      boundaries(b) = plane(b, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 0.0_dp, 1.0_dp])
+      boundaries(b)%drive%frequency = 4.0_dp
+      boundaries(b)%drive%oscillation(1) = 0.5_dp
+    end do
+    call turn_round(boundaries, physics, 0.0625_dp, now)
+    call check_close(now%difference, 0.0_dp, 1.0e-12_dp, "planes that turn round together")
+    call check_close(largest_imposed(3, boundaries, lever, 1.0_dp, physics, 0.0625_dp, now), 0.0_dp, 1.0e-12_dp, &
+      & "planes that go together")
+    physics%gravity(3) = -1.0_dp
+    call turn_round(boundaries, physics, 0.0625_dp, now)
+    call check_close(now%difference, 0.0_dp, 1.0e-12_dp, "a box that turns round")
+    call check_close(largest_imposed(3, boundaries, lever, 1.0_dp, physics, 0.0625_dp, now), 2.0_dp*two_pi, 1.0e-12_dp, &
+      & "a box that turns round, under gravity")
+    physics%gravity(3) = 0.0_dp
+    boundaries(2)%drive%phase = 0.5_dp*two_pi
+    call turn_round(boundaries, physics, 0.0625_dp, now)
+    call check_close(largest_imposed(3, boundaries, lever, 1.0_dp, physics, 0.0625_dp, now), 4.0_dp*two_pi, 1.0e-12_dp, &
+      & "planes that go against each other")
+    do b = 1, 2
+      boundaries(b)%drive%oscillation(:) = 0.0_dp
+    end do
+    call turn_round(boundaries, physics, 0.0625_dp, now)
+    call check_close(largest_imposed(3, boundaries, lever, 1.0_dp, physics, 0.0625_dp, now), 0.0_dp, 0.0_dp, "planes at rest")
+    ! vx vy vz, wx wy wz, fx fy fz, pressure
+    associate (table => boundaries(1)%drive%table)
+      allocate (table%has(10), source=.false.)
+      table%has(2) = .true.
+      allocate (table%time(3), table%value(10, 3), source=0.0_dp)
+      table%time(:) = [0.0_dp, 1.0_dp, 2.0_dp]
+      table%value(2, :) = [0.0_dp, 3.0_dp, 7.0_dp]
+    end associate
+    call turn_round(boundaries, physics, 1.0e-3_dp, now)
+    call check_close(now%difference, 3.0e-3_dp, 1.0e-12_dp, "a plane that starts slowly")
+    call check_close(largest_imposed(3, boundaries, lever, 1.0_dp, physics, 1.0e-3_dp, now), 3.0_dp, 1.0e-12_dp, &
+      & "a plane that starts slowly, at its next row")
+    physics%cell%fastest = 5.0_dp
+    call check_close(largest_imposed(3, boundaries, lever, 2.0_dp, physics, 1.0e-3_dp, now), 10.0_dp, 1.0e-12_dp, &
+      & "a cell whose rates begin")
+  end subroutine test_turning_round
+
+  !> What is imposed at a time by boundaries that do not turn.
+  subroutine turn_round(boundaries, physics, time, now)
+    type(boundary_t), intent(inout) :: boundaries(2)
+    type(physics_t), intent(in) :: physics
+    real(dp), intent(in) :: time
+    type(imposed_motion_t), intent(out) :: now
+    real(dp), parameter :: lever(2) = 0.0_dp
+    integer :: k
+
+    do k = 1, 2
+      call boundaries(k)%prescribe(3, time)
+    end do
+    call find_imposed(3, boundaries, lever, 1.0_dp, physics, now)
+  end subroutine turn_round
 
   !> Input file of a scene, in its units.
   function text_of(scene) result(text)

@@ -150,6 +150,7 @@ contains
     call check_vector(scene%cell_pressure, [0.0_dp, 0.0_dp, 7.0_dp], "cell_pressure")
     call check_vector(scene%cell_shear_stress, [0.0_dp, 0.0_dp, -2.0_dp], "cell_shear_stress")
     call check_equal(scene%cell_table, "cell.csv", "cell_table")
+    call check(scene%cell_table_repeats .and. .not. scene%gravity_table_repeats, "a table that repeats, and one that is not there")
     call check_close(scene%cell_inertia, 0.5_dp, 0.0_dp, "cell_inertia")
     call check_close(scene%skin, 0.375_dp, 0.0_dp, "skin")
     call check(scene%skin_given, "skin_given")
@@ -187,6 +188,7 @@ contains
       // "  alert_distance = 0.125, skin = 0.375, overlap_allowed = 0.0625, overlap_projection = .false." // newline &
       // "  start_overlap = 0.25, list_steps = 12, cell_strain_rate = 0, 0.5, cell_shear_rate = 0.25" // newline &
       // "  cell_pressure = 0, 0, 7, cell_shear_stress = 0, 0, -2, cell_table = 'cell.csv', cell_inertia = 0.5" // newline &
+      // "  cell_table_repeats = T" // newline &
       // "/" // newline // "&boundary shape = 'plane', normal = 0, 0, 2 /" // newline &
       // "&time step = 0.0078125, steps = 40, theta = 0.75, rest_energy = 0.001 /" // newline &
       // "&solver method = 'nscdd_ep', criterion = 'error', tolerance = 0.03125, max_iterations = 50, sweeps = 3" // newline &
@@ -901,7 +903,8 @@ contains
 
     call accept("&boundary name = 'floor'" // plane_keys // "friction = 0.5 remove_at = 3 /" &
       // scene("bodies = 'column' wall_friction = 0.25 wall_restitution = 0.75") &
-      // "&boundary shape = 'circle' radius = 2 point = 1, 2 pivot = 3, 4 rotation = 5 velocity = 6, 7 table = 't.csv' /" &
+      // "&boundary shape = 'circle' radius = 2 point = 1, 2 pivot = 3, 4 rotation = 5 velocity = 6, 7 table = 't.csv'" &
+      // " table_repeats = T oscillation = 0.5, 0.25 rotation_oscillation = 0.125 frequency = 11 phase = -12 /" &
       // "&BOUNDARY Name = ""a, 'lid'"" shape = 'plane' normal = 0, -1 free(2) = T mass = 8 force(2) = -9 pressure = 10" &
       // " restitution = 0.125 /", "three boundaries", config)
     call check_equal(size(config%boundaries), 3, "number of boundaries")
@@ -930,6 +933,11 @@ contains
       call check_vector(drum%rotation, [5.0_dp, 0.0_dp, 0.0_dp], "rotation of the 2nd")
       call check_vector(drum%velocity, [6.0_dp, 7.0_dp, 0.0_dp], "velocity of the 2nd")
       call check_equal(drum%table, "t.csv", "table of the 2nd")
+      call check(drum%table_repeats .and. .not. lid%table_repeats, "table_repeats")
+      call check_vector(drum%oscillation, [0.5_dp, 0.25_dp, 0.0_dp], "oscillation of the 2nd")
+      call check_vector(drum%rotation_oscillation, [0.125_dp, 0.0_dp, 0.0_dp], "rotation_oscillation of the 2nd")
+      call check_close(drum%frequency, 11.0_dp, 0.0_dp, "frequency")
+      call check_close(drum%phase, -12.0_dp, 0.0_dp, "phase")
       call check(all(lid%free .eqv. [.false., .true., .false.]), "free of the 3rd")
       call check_vector(lid%force, [0.0_dp, -9.0_dp, 0.0_dp], "force of the 3rd")
       call check_close(lid%pressure, 10.0_dp, 0.0_dp, "pressure of the 3rd")
@@ -1165,6 +1173,21 @@ contains
       first // "rotation = 1: expected 0 where a component of the translation is free")
     call refuse(plane // "free = T mass = 1 force = 1, 1 /", &
       first // "force = 1, 1: expected 0 along each component that is not free")
+    call refuse(plane // "free = T mass = 1 oscillation = 1 frequency = 1 /", &
+      first // "oscillation = 1: expected 0 along each component that is free")
+    call accept(plane // "free = T mass = 1 oscillation(2) = 1 frequency = 1 /", "an oscillation across a free component", config)
+    call refuse(plane // "free = T mass = 1 rotation_oscillation = 1 frequency = 1 /", &
+      first // "rotation_oscillation = 1: expected 0 where a component of the translation is free")
+    call refuse(plane // "oscillation = 1 /", first // "frequency: expected > 0 where the boundary oscillates")
+    call refuse(plane // "rotation_oscillation = 1 frequency = -1 /", &
+      first // "frequency = -1: expected > 0 where the boundary oscillates")
+    call refuse(plane // "frequency = 1 /", first // "frequency = 1: expected 0 without an oscillation")
+    call refuse(plane // "phase = 1 /", first // "phase = 1: expected 0 without an oscillation")
+    call refuse(plane // "table_repeats = T /", first // "table_repeats = T: expected .false. without a table")
+    call refuse(scene("bodies = 'column' gravity_table_repeats = T"), &
+      "&scene gravity_table_repeats = T: expected .false. without a gravity_table")
+    call refuse(scene("bodies = 'column' cell_table_repeats = T"), &
+      "&scene cell_table_repeats = T: expected .false. without a cell_table")
     call refuse(plane // "pressure = 1 /", first // "pressure = 1: " // no_pressure)
     call refuse(plane // "free = T, F mass = 1 pressure = 1 /", first // "pressure = 1: " // no_pressure)
   end subroutine test_rules_of_free_boundary
@@ -1498,8 +1521,11 @@ contains
     call check_equal(text(index(text, "&boundary"):index(text, "&time") - 1), "&boundary" // newline &
       // "  name = 'boundary 1'" // newline // "  shape = 'circle'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
       // "  radius = 2.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline // "  rotation = 0.0, 0.0, 0.0" // newline &
+      // "  oscillation = 0.0, 0.0, 0.0" // newline // "  rotation_oscillation = 0.0, 0.0, 0.0" // newline &
+      // "  frequency = 0.0" // newline // "  phase = 0.0" // newline &
       // "  ! pivot = the value of `point`" // newline // "  free = .false., .true., .false." // newline &
       // "  force = 0.0, 0.0, 0.0" // newline // "  mass = 3.0" // newline // "  table = ''" // newline &
+      // "  table_repeats = .false." // newline &
       // "  friction = 0.5" // newline // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
       // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &
       // "  ! rolling_friction = the value of `wall_rolling_friction` of `&scene`" // newline &
@@ -1508,9 +1534,13 @@ contains
       // "  ! remove_at = never" // newline // "/" // newline // "&boundary" // newline &
       // "  name = 'boundary 2'" // newline // "  shape = 'plane'" // newline // "  point = 0.0, 0.0, 0.0" // newline &
       // "  normal = 0.0, 1.0, 0.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline &
-      // "  rotation = 0.0, 0.0, 0.0" // newline // "  ! pivot = the value of `point`" // newline &
+      // "  rotation = 0.0, 0.0, 0.0" // newline &
+      // "  oscillation = 0.0, 0.0, 0.0" // newline // "  rotation_oscillation = 0.0, 0.0, 0.0" // newline &
+      // "  frequency = 0.0" // newline // "  phase = 0.0" // newline &
+      // "  ! pivot = the value of `point`" // newline &
       // "  free = .false., .false., .false." // newline // "  force = 0.0, 0.0, 0.0" // newline &
       // "  pressure = 0.0" // newline // "  table = ''" // newline &
+      // "  table_repeats = .false." // newline &
       // "  ! friction = the value of `wall_friction` of `&scene`" // newline &
       // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
       // "  ! tangential_restitution = the value of `wall_tangential_restitution` of `&scene`" // newline &

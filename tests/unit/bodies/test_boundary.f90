@@ -3,7 +3,8 @@ program test_boundary
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_boundary, only: boundary_t, boundary_words, drive_names
+  use gravier_boundary, only: boundary_t, boundary_words
+  use gravier_boundary_drive, only: drive_names
   use gravier_surface, only: surface_features_t
   use gravier_surface_registry, only: surface_holder_t, registered_surfaces, make_surface
   use gravier_test_scenes, only: draw, change_shape
@@ -27,6 +28,7 @@ program test_boundary
   call test_axis_of_rotation()
   call test_drives(2)
   call test_drives(3)
+  call test_oscillation()
   call test_forces()
   call test_shift()
   call test_state()
@@ -209,10 +211,10 @@ contains
     end do
     call make_surface("sphinx", b%surface)
     call check(.not. allocated(b%surface), "no shape of another word")
-    call check(.not. b%is_driven() .and. .not. b%turns(), "a boundary at rest")
+    call check(.not. b%is_driven() .and. .not. b%drive%turns(), "a boundary at rest")
     b%free(2) = .true.
-    b%given_spin(3) = -1.0_dp
-    call check(b%is_driven() .and. b%turns(), "free, turning")
+    b%drive%spin(3) = -1.0_dp
+    call check(b%is_driven() .and. b%drive%turns(), "free, turning")
   end subroutine test_kinds
 
   subroutine test_velocity()
@@ -329,7 +331,7 @@ contains
       close (unit)
       first = last + 2
       call make_constants(b)
-      call b%table%read(file, names, error)
+      call b%drive%table%read(file, names, .false., error)
       call check(.not. allocated(error), "table of drives")
       if (allocated(error)) return
       call b%prescribe(nd, 1.0_dp)
@@ -340,8 +342,8 @@ contains
       found(1:nd) = b%velocity(1:nd)
       if (nd == 2) found(3) = b%spin(3)
       if (nd == 3) found(4:6) = b%spin
-      b%given_spin(:) = 0.0_dp
-      call check(b%turns() .eqv. (k > nd .and. k <= merge(3, 6, nd == 2)), "turning by a column")
+      b%drive%spin(:) = 0.0_dp
+      call check(b%drive%turns() .eqv. (k > nd .and. k <= merge(3, 6, nd == 2)), "turning by a column")
       b%free(:) = .true.
       call b%applied_force(nd, 1.0_dp, 0.0_dp, force(1:nd))
       found(n - nd:n - 1) = force(1:nd)
@@ -357,11 +359,58 @@ contains
 
     call make_surface("plane", b%surface)
     b%surface%axis(1) = 1.0_dp
-    b%given_velocity(:) = [11.0_dp, 12.0_dp, 13.0_dp]
-    b%given_spin(:) = [14.0_dp, 15.0_dp, 16.0_dp]
-    b%given_force(:) = [17.0_dp, 18.0_dp, 19.0_dp]
-    b%given_pressure = 20.0_dp
+    b%drive%velocity(:) = [11.0_dp, 12.0_dp, 13.0_dp]
+    b%drive%spin(:) = [14.0_dp, 15.0_dp, 16.0_dp]
+    b%drive%force(:) = [17.0_dp, 18.0_dp, 19.0_dp]
+    b%drive%pressure = 20.0_dp
   end subroutine make_constants
+
+  !> An oscillation is added to a constant and to a table, moves the surface by its amplitude and back, and turns about one axis.
+  subroutine test_oscillation()
+    integer, parameter :: steps = 400
+    real(dp), parameter :: pi = 4.0_dp*atan(1.0_dp)
+    type(boundary_t) :: b
+    real(dp) :: times(2), place(3), low, high
+    integer :: k
+
+    call make_surface("plane", b%surface)
+    call check(.not. (b%drive%moves() .or. b%drive%changes()), "nothing moves")
+    b%drive%velocity(:) = [0.0_dp, 1.0_dp, 0.0_dp]
+    call check(b%drive%moves() .and. .not. b%drive%changes(), "a constant motion")
+    b%drive%oscillation(2) = 0.5_dp
+    b%drive%frequency = 2.0_dp
+    b%drive%phase = 0.25_dp*pi
+    call check(b%drive%changes() .and. b%drive%changes_after(1.0e9_dp) .and. .not. b%drive%turns(), "it goes on for ever")
+    ! 1 + A 2 pi f cos(2 pi f t + pi/4), where f t is 1/8 and then 3/8 beyond whole periods
+    call check_close(b%drive%velocity_at(2, 1.0e6_dp + 0.0625_dp), 1.0_dp, 1.0e-8_dp, "velocity where it turns round")
+    call check_close(b%drive%velocity_at(2, 0.1875_dp), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "velocity half-way")
+    call check_close(b%drive%velocity_at(1, 0.1875_dp), 0.0_dp, 0.0_dp, "velocity along another axis")
+    call check_close(b%drive%velocity_beside(2, 0.0625_dp, 1), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "a quarter of a period later")
+    call check_close(b%drive%velocity_beside(2, 0.0625_dp, -1), 1.0_dp + 2.0_dp*pi, 1.0e-14_dp, "a quarter of a period before")
+    call b%drive%find_extremes(times)
+    do k = 1, 2
+      call check_close(abs(b%drive%velocity_at(2, times(k)) - 1.0_dp), 2.0_dp*pi, 1.0e-14_dp, "velocity at an extreme")
+      call check(times(k) >= 0.0_dp .and. times(k) < 0.5_dp, "extremes of the first period")
+    end do
+    b%drive%velocity(2) = 0.0_dp
+    b%drive%rotation_oscillation(3) = 0.1_dp
+    call check(b%drive%turns() .and. b%drive%turns_about(3) .and. .not. b%drive%turns_about(1), "it turns about one axis")
+    call check_close(b%drive%spin_at(3, 0.1875_dp), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation")
+    call check_close(b%drive%spin_beside(3, 0.0625_dp, 1), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation beside")
+    b%drive%rotation_oscillation(3) = 0.0_dp
+    low = 0.0_dp
+    high = 0.0_dp
+    do k = 1, steps
+      ! velocities in the middle of steps
+      call b%prescribe(2, 0.5_dp*(k - 0.5_dp)/steps)
+      call b%move(0.5_dp/steps)
+      call b%find_place(place)
+      low = min(low, place(2))
+      high = max(high, place(2))
+    end do
+    call check_close(place(2), 0.0_dp, 1.0e-14_dp, "back after a period")
+    call check_close(high - low, 1.0_dp, 1.0e-4_dp, "twice the amplitude")
+  end subroutine test_oscillation
 
   !> Forces act on free components only, whose velocities are not prescribed.
   subroutine test_forces()
@@ -376,10 +425,10 @@ contains
     call b%applied_force(3, 0.0_dp, 0.5_dp, force)
     call check_vector(force, [0.0_dp, 24.0_dp, 0.0_dp], 100*rounding, "force on the free component")
     b%free(:) = .false.
-    b%given_spin(:) = 0.0_dp
-    call check(.not. b%turns() .and. .not. b%is_driven(), "neither turning nor free")
-    b%given_spin(1) = 1.0_dp
-    call check(b%turns(), "turning by a constant")
+    b%drive%spin(:) = 0.0_dp
+    call check(.not. b%drive%turns() .and. .not. b%is_driven(), "neither turning nor free")
+    b%drive%spin(1) = 1.0_dp
+    call check(b%drive%turns(), "turning by a constant")
   end subroutine test_forces
 
   !> Everything that time changes comes back bit for bit, and nothing else does.

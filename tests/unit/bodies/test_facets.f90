@@ -317,7 +317,7 @@ contains
     call boundary%find_facets([7.9_dp, 0.1_dp], 0.5_dp, near)
     call check_equal(near%n, 1, "with its image it is one line")
     call check_close(maxval(near%corner(1, :, 1)), 2.1_dp, 1.0e-14_dp, "which goes on")
-    boundary%given_spin(3) = 1.0_dp
+    boundary%drive%spin(3) = 1.0_dp
     call boundary%find_facets([7.9_dp, 0.1_dp], 0.5_dp, near)
     call check_close(maxval(near%corner(1, :, 1)), 0.1_dp, 1.0e-14_dp, "what turns has the nearest image alone")
     boundary%present = .false.

@@ -11,6 +11,7 @@ program test_time_table
 
   call MPI_Init()
   call test_values()
+  call test_repeating()
   call test_one_row()
   call test_variation()
   call test_many_rows()
@@ -29,12 +30,17 @@ contains
     close (unit)
   end subroutine write_file
 
-  subroutine read_table(text, error)
+  subroutine read_table(text, error, repeats)
     character(len=*), intent(in) :: text
     type(error_t), allocatable, intent(out) :: error
+    !> false where absent
+    logical, intent(in), optional :: repeats
+    logical :: again
 
+    again = .false.
+    if (present(repeats)) again = repeats
     call write_file(text)
-    call table%read(file, names, error)
+    call table%read(file, names, again, error)
   end subroutine read_table
 
   !> Columns in another order than the names; numbers that are exact.
@@ -59,6 +65,35 @@ contains
     call read_table("vx,time"//newline//"8,1"//newline//"8,3"//newline, error)
     call check(.not. table%changes_after(0.0_dp), "equal rows are no change")
   end subroutine test_values
+
+  !> A table from 1 to 5 that repeats, before and after these times; one that does not forgets that another one did.
+  subroutine test_repeating()
+    character(len=*), parameter :: saw = "time,vx,omega"//newline//"1,0,7"//newline//"2,4,7"//newline//"5,0,7"//newline
+    type(error_t), allocatable :: error
+
+    call read_table(saw, error, .true.)
+    call check(.not. allocated(error), "a table that repeats")
+    if (allocated(error)) return
+    call check_close(table%at(1, 1.5_dp), 2.0_dp, 0.0_dp, "in the first period")
+    call check_close(table%at(1, 5.5_dp), 2.0_dp, 0.0_dp, "in the second period")
+    call check_close(table%at(1, 4.0e6_dp + 2.0_dp), 4.0_dp, 0.0_dp, "after a million of periods")
+    call check_close(table%at(1, 0.5_dp), table%at(1, 4.5_dp), 0.0_dp, "before the first row")
+    call check_close(table%at(3, 77.0_dp), 7.0_dp, 0.0_dp, "another column")
+    call check_close(table%beside(1, 5.5_dp, 1), 4.0_dp, 0.0_dp, "the row after a time")
+    call check_close(table%beside(1, 6.5_dp, -1), 4.0_dp, 0.0_dp, "the row before a time")
+    call check(table%changes_after(1.0e9_dp), "it changes for ever")
+    call read_table(saw, error)
+    call check_close(table%at(1, 5.5_dp), 0.0_dp, 0.0_dp, "a table that does not repeat")
+    call check_close(table%beside(1, 0.5_dp, 1), 0.0_dp, 0.0_dp, "beside a time before the table")
+    call check_close(table%beside(1, 9.0_dp, -1), 0.0_dp, 0.0_dp, "beside a time after the table")
+    call check_close(table%beside(1, 1.0_dp, 1), 0.0_dp, 0.0_dp, "beside the first row")
+    call check(.not. table%changes_after(5.0_dp), "it ends")
+    call refuse("time,vx"//newline//"1,2"//newline, "table.csv: a table that repeats has one row; expected two or more", .true.)
+    call refuse("time,vx"//newline//"1,2"//newline//"2,3"//newline, "table.csv: a table that repeats ends with another row "// &
+      & "than it begins with; expected the values of the first row in the last", .true.)
+    call read_table("time,vx"//newline//"1,2"//newline//"2,2"//newline, error, .true.)
+    call check(.not. table%changes_after(0.0_dp), "equal rows that repeat are no change")
+  end subroutine test_repeating
 
   subroutine test_one_row()
     type(error_t), allocatable :: error
@@ -133,12 +168,13 @@ contains
     call refuse("", "table.csv: empty")
   end subroutine test_refusals
 
-  subroutine refuse(text, expected)
+  subroutine refuse(text, expected, repeats)
     !> of the file; how the message begins
     character(len=*), intent(in) :: text, expected
+    logical, intent(in), optional :: repeats
     type(error_t), allocatable :: error
 
-    call read_table(text, error)
+    call read_table(text, error, repeats)
     call check(allocated(error), "refused: "//expected)
     if (.not. allocated(error)) return
     call check_equal(error%message(1:min(len(expected), len(error%message))), expected, "message")

@@ -43,12 +43,13 @@ contains
     do b = 1, 2
       call make_surface("segment", boundaries(b)%surface)
       boundaries(b)%surface%edge(1:2, 1) = [1.0_dp, 0.0_dp]
-      allocate (boundaries(b)%table%time(2), boundaries(b)%table%value(1, 2), boundaries(b)%table%has(1))
+      allocate (boundaries(b)%drive%table%time(2), boundaries(b)%drive%table%value(1, 2), boundaries(b)%drive%table%has(1))
     end do
     boundaries(1)%velocity(1) = 7.0_dp
     call note_boundaries(boundaries, reference)
     call check_equal(size(reference), 2, "one of each")
-    call check(.not. allocated(reference(1)%table%value) .and. allocated(boundaries(1)%table%value), "no rows of a table")
+    call check(.not. allocated(reference(1)%drive%table%value), "no rows of a table")
+    call check(allocated(boundaries(1)%drive%table%value), "the boundary itself keeps them")
     call check_close(reference(1)%velocity(1), 7.0_dp, 0.0_dp, "its velocity")
     call boundaries(2)%shift([0.3_dp, 0.4_dp])
     call check_close(way_of(boundaries(1), reference(1)), 0.0_dp, 0.0_dp, "the way of one that stands")

@@ -17,6 +17,9 @@ program test_stagnation
   call check_equal(first_due(.true., 0.0_dp, 0.99999_dp), 1020, "one that falls by less than a tenth is")
   call check_equal(first_due(.true., 0.0_dp, 1.0001_dp, 0.9995_dp), 0, "no stagnation: the figure rises, the error falls")
   call check_equal(first_due(.true., 0.0_dp, 0.9995_dp, 1.0001_dp), 0, "no stagnation: the error rises, the figure falls")
+  call check_equal(first_due(.true., 0.0_dp, 1.0_dp, patience=40), 60, "a method of direct solves: 40, and as many as before")
+  call check_equal(first_due(.true., 5.0e-4_dp, 1.0_dp, patience=40), 60, "whatever the residual")
+  call check_direct()
   call check_last()
   call check_growth()
   call finish_checks()
@@ -25,10 +28,12 @@ contains
 
   !> The first iteration of 20 000, looked at each tenth, at which a figure that falls by a factor an iteration is due; 0 if none
   !> is. The velocity error falls by the same factor, or by its own.
-  integer function first_due(accelerated, missing_residual, factor, factor_of_error)
+  integer function first_due(accelerated, missing_residual, factor, factor_of_error, patience)
     logical, intent(in) :: accelerated
     real(dp), intent(in) :: missing_residual, factor
     real(dp), intent(in), optional :: factor_of_error
+    !> of a method of direct solves
+    integer, intent(in), optional :: patience
     real(dp) :: factors(2), figures(2)
     type(stagnation_t) :: stagnation
     integer :: iteration
@@ -36,6 +41,7 @@ contains
 
     factors(:) = factor
     if (present(factor_of_error)) factors(2) = factor_of_error
+    if (present(patience)) stagnation%patience = patience
     first_due = 0
     do iteration = 10, 20000, 10
       figures(:) = factors**iteration
@@ -45,6 +51,21 @@ contains
       return
     end do
   end function first_due
+
+  !> A method of direct solves does not wait for waves, and nothing follows it.
+  subroutine check_direct()
+    type(stagnation_t) :: stagnation
+    type(contact_problem_t) :: empty
+    logical :: stagnates, in_vain, due
+
+    allocate (empty%sub(0))
+    stagnation%patience = 40
+    call check(.not. stagnation%may_begin_last(60, 1), "no plain iterations follow direct solves")
+    call stagnation%note(empty, 100, [1.0_dp, 1.0_dp], .true., 0.0_dp, due)
+    call stagnation%note(empty, 200, [1.0_dp, 1.0_dp], .true., 0.0_dp, due)
+    call stagnation%judge(empty, 250, 10**6, stagnates, in_vain)
+    call check(stagnates .and. .not. in_vain, "a direct solve does not wait for waves")
+  end subroutine check_direct
 
   !> Plain iterations that come last, after 1500 others, are as many and 2000 more, whatever they gain. They are tried where a load
   !> can spread so far in them.

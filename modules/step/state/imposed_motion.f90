@@ -1,0 +1,124 @@
+!> What boundaries and the cell impose on the grains: the largest difference of their velocities, now and where their drives turn
+!> round.
+module gravier_imposed_motion
+  use gravier_kinds, only: dp
+  use gravier_boundary, only: boundary_t
+  use gravier_physics, only: physics_t
+  implicit none
+  private
+  public :: imposed_motion_t, find_imposed, largest_imposed
+
+  !> Of a time.
+  type :: imposed_motion_t
+    !> largest difference of velocities [m/s]
+    real(dp) :: difference = 0.0_dp
+    !> velocity of all boundaries where they move alike, else 0 [m/s]
+    real(dp) :: common(3) = 0.0_dp
+    !> there is a boundary that grains touch
+    logical :: bounded = .false.
+  end type imposed_motion_t
+
+contains
+
+  !> What boundaries impose with the velocities that they have, and the cell with the rates of the step. Velocities differ by axis,
+  !> over the boundaries that no force moves along it; rest is one of them where a single boundary is prescribed, and where there is
+  !> gravity, whose direction a box that is shaken does not take along.
+  pure subroutine find_imposed(nd, boundaries, lever, diameter, physics, motion)
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> how far each boundary reaches from its pivot (boundaries), diameter of the mean grain [m]
+    real(dp), intent(in) :: lever(:), diameter
+    type(physics_t), intent(in) :: physics
+    type(imposed_motion_t), intent(out) :: motion
+    real(dp) :: velocity(3, size(boundaries)), spin(3, size(boundaries))
+    integer :: b
+
+    do b = 1, size(boundaries)
+      velocity(:, b) = boundaries(b)%velocity
+      spin(:, b) = boundaries(b)%spin
+    end do
+    call compare(nd, boundaries, velocity, spin, lever, physics, motion)
+    motion%difference = max(motion%difference, norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*diameter)
+  end subroutine find_imposed
+
+  !> The largest difference of a time and of the times beside it in tables and oscillations, so that a drive which starts from
+  !> rest or turns round counts with the speed that it comes to [m/s].
+  pure real(dp) function largest_imposed(nd, boundaries, lever, diameter, physics, time, now) result(largest)
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> how far each boundary reaches from its pivot (boundaries), diameter of the mean grain [m]
+    real(dp), intent(in) :: lever(:), diameter
+    type(physics_t), intent(in) :: physics
+    !> [s]
+    real(dp), intent(in) :: time
+    !> what is imposed at that time
+    type(imposed_motion_t), intent(in) :: now
+    type(imposed_motion_t) :: beside
+    real(dp) :: velocity(3, size(boundaries)), spin(3, size(boundaries))
+    logical :: changes
+    integer :: b, d, side
+
+    largest = max(now%difference, physics%cell%fastest*diameter)
+    changes = .false.
+    do b = 1, size(boundaries)
+      changes = changes .or. boundaries(b)%drive%changes()
+    end do
+    if (.not. changes) return
+    do side = -1, 1, 2
+      do b = 1, size(boundaries)
+        velocity(:, b) = 0.0_dp
+        do d = 1, 3
+          velocity(d, b) = boundaries(b)%drive%velocity_beside(d, time, side)
+          spin(d, b) = boundaries(b)%drive%spin_beside(d, time, side)
+        end do
+      end do
+      call compare(nd, boundaries, velocity, spin, lever, physics, beside)
+      largest = max(largest, beside%difference)
+    end do
+  end function largest_imposed
+
+  !> Compare velocities of boundaries.
+  pure subroutine compare(nd, boundaries, velocity, spin, lever, physics, motion)
+    integer, intent(in) :: nd
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> (3, boundaries) [m/s], [rad/s]
+    real(dp), intent(in) :: velocity(:, :), spin(:, :)
+    !> (boundaries) [m]
+    real(dp), intent(in) :: lever(:)
+    type(physics_t), intent(in) :: physics
+    type(imposed_motion_t), intent(out) :: motion
+    real(dp) :: low(nd), high(nd), turning
+    integer :: b, d, n
+
+    low(:) = huge(1.0_dp)
+    high(:) = -huge(1.0_dp)
+    turning = 0.0_dp
+    n = 0
+    do b = 1, size(boundaries)
+      associate (boundary => boundaries(b))
+        if (.not. boundary%present .or. boundary%lets_out()) cycle
+        motion%bounded = .true.
+        if (.not. all(boundary%free(1:nd))) n = n + 1
+        do d = 1, nd
+          if (boundary%free(d)) cycle
+          low(d) = min(low(d), velocity(d, b))
+          high(d) = max(high(d), velocity(d, b))
+        end do
+        turning = max(turning, norm2(spin(:, b))*lever(b))
+      end associate
+    end do
+    if (n == 0) return
+    do d = 1, nd
+      ! along an axis along which forces move all, nothing is imposed
+      if (low(d) > high(d)) low(d) = 0.0_dp
+      high(d) = max(low(d), high(d))
+    end do
+    if (.not. (turning > 0.0_dp .or. any(high > low))) motion%common(1:nd) = low
+    if (n == 1 .or. any(abs(physics%gravity(1:nd)) > 0.0_dp)) then
+      low(:) = min(low, 0.0_dp)
+      high(:) = max(high, 0.0_dp)
+    end if
+    motion%difference = max(norm2(high - low), turning)
+  end subroutine compare
+
+end module gravier_imposed_motion
