@@ -13,8 +13,9 @@ module gravier_sample_rest
   !> by which the loads may be out of balance
   real(dp), parameter :: imbalance_allowed = 0.02_dp
 
-  !> A step is one at rest when its solve converged, the mean kinetic energy of a grain is below rest_tolerance m g R
-  !> (settled) or rest_tolerance pressure R^nd (compacted), and the forces of the grains on the boundaries balance the loads:
+  !> A step is one at rest when its solve converged, the mean kinetic energy of a grain, without the spins of disks and spheres, is
+  !> below rest_tolerance m g R (settled) or rest_tolerance pressure R^nd (compacted), and the forces of the grains on the
+  !> boundaries balance the loads:
   !> their sum the weight (settled); that on each free plane the pressure, and their sum nothing (compacted). Without the
   !> second condition grains that begin to fall, or wait for the planes to come, would be at rest. m and R are means.
   type :: rest_t
@@ -58,7 +59,7 @@ contains
       call weigh(simulation, scale, self%imbalance)
       scale = scale/simulation%n_grains*simulation%decomposition%rule%mean_radius
     end if
-    self%energy = (figures%kinetic_energy + energy_of_planes(simulation))/simulation%n_grains/scale
+    self%energy = (simulation%balance%moving + energy_of_planes(simulation))/simulation%n_grains/scale
     if (figures%solve%status == solve_converged) then
       self%steps = self%steps + 1
     else

@@ -8,18 +8,19 @@ module gravier_timers
   private
   public :: clock, start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases
   public :: phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, phase_sweep, phase_exchange, &
-    & phase_interface_solve, phase_factorise, phase_check, phase_reduction, phase_projection, phase_output
+    & phase_interface_solve, phase_factorise, phase_check, phase_reduction, phase_projection, phase_diagnostics, &
+    & phase_output
 
   integer, parameter :: phase_bodies = 1, phase_neighbourhood = 2, phase_detection = 3, phase_interface = 4, phase_setup = 5, &
     & phase_sweep = 6, phase_exchange = 7, phase_factorise = 8, phase_interface_solve = 9, phase_check = 10, &
-    & phase_reduction = 11, phase_projection = 12, phase_output = 13
-  integer, parameter :: n_phases = 13
+    & phase_reduction = 11, phase_projection = 12, phase_diagnostics = 13, phase_output = 14
+  integer, parameter :: n_phases = 14
   !> what the log calls the phases
   character(len=28), parameter :: phase_names(n_phases) = [character(len=28) :: "motion and migration", &
     & "neighbour lists and ghosts", "detection of contacts", "interface: shared bodies", &
     & "set-up of the solve", "sweeps", "exchange", "factorisation", "interface solve", "residual checks", &
     & "reductions of the solve", &
-    & "projection of overlaps", "output"]
+    & "projection of overlaps", "diagnostics and regions", "output"]
 
   real(dp) :: elapsed(n_phases) = 0.0_dp
   !> phases under way, the innermost last, and since when it is the innermost

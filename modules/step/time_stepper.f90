@@ -382,7 +382,7 @@ contains
     if (allocated(error)) return
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
-      call self%tally%add_solve(solve, self%velocity_scale%kind)
+      call self%tally%add_solve(solve, self%velocity_scale%kind, self%velocity_scale%own)
       self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
       if (solve%status == solve_diverged) then
@@ -407,7 +407,7 @@ contains
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
-    self%quiet = merge(self%quiet + 1, 0, figures%kinetic_energy <= self%rest_energy .and. figures%entered == 0 .and. &
+    self%quiet = merge(self%quiet + 1, 0, self%balance%moving <= self%rest_energy .and. figures%entered == 0 .and. &
       & .not. self%inflow%awaits(self%time))
     call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left

@@ -223,7 +223,8 @@ module gravier_config_table
      key_t("time", "theta", kind_real, "0.5", "in [0.5, 1]", &
            "factor of the new velocity in the positions: 0.5 is the mid-point rule, 1 is implicit Euler"), &
      key_t("time", "rest_energy", kind_real, "0.0", ">= 0", &
-           "the run ends when the kinetic energy of the grains was at most this in 10 steps, one after the other; 0: it does not", &
+           "the run ends when the kinetic energy of the grains, of disks and spheres without their spins, was at most this in "// &
+           "10 steps, one after the other; 0: it does not", &
            unit="J"), &
      key_t("time", "stop_boundary", kind_text, "''", "", &
            "name of a `&boundary`: the run ends when it is `stop_displacement` away from its place at the start of the scene"), &

@@ -31,7 +31,8 @@ module gravier_config_table_grains
      key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &
            unit="Pa, N/m in 2D", note="required", chooser="preparation", chosen="compacted"), &
      key_t("sample", "rest_tolerance", kind_real, "1e-6", "> 0", &
-           "mean kinetic energy of a grain at rest, over m g R (settled) or over `pressure` R^`dimension` (compacted)", &
+           "mean kinetic energy of a grain at rest, of disks and spheres without their spins, over m g R (settled) or over "// &
+           "`pressure` R^`dimension` (compacted)", &
            chooser="preparation", chosen="settled compacted"), &
      key_t("sample", "max_steps", kind_integer, "100000", ">= 1", "steps after which the preparation gives up", &
            chooser="preparation", chosen="settled compacted"), &

@@ -88,7 +88,7 @@ contains
   end function drifts
 
   !> How far grains have moved in steps whose motion is not told from the errors of their solves, where that can be seen, and what
-  !> resolves it. Errors are about proportional to the goal, so that half of the goal which would keep the way below a bound does so.
+  !> resolves it. Errors are about proportional to the goal: half of the goal which would keep the way below a bound does so.
   function drift_lines(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
@@ -97,7 +97,7 @@ contains
     if (.not. drifts(simulation)) return
     associate (tally => simulation%tally, d => simulation%velocity_scale%diameter)
       text = "drift       in "//to_text(tally%unresolved)//" of "//counted(tally%steps, "step")// &
-        & " grains moved no faster than twice the velocity error of the solve, by "//plain(tally%drift/d)// &
+        & " bodies moved no faster than twice the velocity error of the solve, by "//plain(tally%drift/d)// &
         & " mean diameters in all"//newline//indent//"that motion may be nothing but errors; the "// &
         & goal_text(simulation, 0.5_dp*most_drift*d/tally%drift)//" would keep them below "//plain(most_drift)// &
         & " mean diameters"//newline

@@ -3,7 +3,7 @@ module gravier_run_summary
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text
   use gravier_timers, only: phase_names, n_phases, phase_neighbourhood, phase_exchange, phase_factorise, phase_interface, &
-    & phase_interface_solve, phase_reduction, phase_output
+    & phase_interface_solve, phase_reduction, phase_diagnostics, phase_output
   use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
@@ -191,7 +191,7 @@ contains
         end if
       end if
       if (drifts(simulation)) text = text//"; in "//to_text(tally%unresolved)//" of "//steps// &
-        & " grains moved by no more than the errors of solves, "//plain(tally%drift/simulation%velocity_scale%diameter)// &
+        & " bodies moved by no more than the errors of solves, "//plain(tally%drift/simulation%velocity_scale%diameter)// &
         & " mean diameters in all: see `drift`"
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
@@ -283,6 +283,8 @@ contains
           & "subdomains as ranks, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
       else if (phases(phase_output) > half .and. config%output%every > 0 .and. config%output%every < config%time%steps) then
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
+      else if (phases(phase_diagnostics) > half) then
+        text = "diagnostics take most of the time: fewer groups &region or keys of &output that add columns to history.csv"
       else if (effort%unreached(at_tolerance) > 0 .and. lost > 0.5_dp) then
         text = "solves that do not converge take most of the iterations: see `to mend it`"
         ! beside sleepers they were solved anew

@@ -53,6 +53,18 @@ class AtRest(RunTestCase):
         self.assertIn(f"at rest     after step {count} of {STEPS}", self.straight.stdout)
         self.assertRegex(self.straight.stdout.rstrip().splitlines()[-1], f"^finished    all {count} steps reached the accuracy")
 
+    def test_spins(self):
+        """A ball that spins about the normal of its only contact spins for ever, and is at rest; one whose spin makes it roll away is not."""
+        for spin, steps in (([0.0, 0.0, 20.0], 10), ([0.0, 20.0, 0.0], 50)):
+            here = self.here(f"spin {steps}")
+            os.makedirs(here)
+            write(os.path.join(here, "ball.csv"), f"id,x,y,z,radius,wx,wy,wz\n1,0,0,0.01,0.01,{spin[0]},{spin[1]},{spin[2]}\n")
+            run = run_case({"scene": {"dimension": 3, "bodies": "file", "bodies_file": "ball.csv", "wall_friction": 0.5},
+                            "boundary": [{"shape": "plane", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0]}],
+                            "time": {"step": 1e-3, "steps": 50, "rest_energy": 1e-9}, "output": {"directory": "results"}}, directory=here)
+            self.assert_status(run, 0)
+            self.assertEqual(run.history()["step"][-1], steps)
+
     def test_what_is_to_come(self):
         """Grains that rest do not end a run before a gate opens, gravity turns, or a belt or a cell starts, nor in the ten steps behind that."""
         files = {"gravity.csv": "time,gx,gy\n0,0,-9.81\n0.1,0,-9.81\n0.2,5,-9.81\n", "belt.csv": "time,vx\n0,0\n0.1,0\n0.2,0.5\n",

@@ -59,6 +59,25 @@ class Turning(SmallScene):
                         record, stretch = self.turn(title, lattice(dimension, apart), axis, strength, 400)
                         self.check_rigid(title, record, stretch)
 
+    def test_projection(self):
+        """The overlap of bonded grains is the length of their bond. Projections take it for none, and move bonded grains together where others are
+        too deep in them: bodies that overlap grew by a tenth, and gained angular momentum."""
+        for dimension, axis in ((2, (0, 0, 1)), (3, (1, 2, 3))):
+            title = f"{dimension}D, bodies that overlap, with projections"
+            with self.subTest(title):
+                record, stretch = self.turn(title, lattice(dimension, -0.1 * RADIUS), axis, 1e4 * MASS, 200, scene={"overlap_projection": True})
+                self.check_rigid(title, record, stretch)
+                self.assertIn("no step projected overlaps", record.run.stdout)
+        # a triangle of bonded disks beside a free one that is too deep in it
+        triangle = [[0.0, 0.0], [1.9 * RADIUS, 0.0], [0.95 * RADIUS, 1.7 * RADIUS]]
+        grains = [Grain(place, material=1) for place in triangle] + [Grain([0.95 * RADIUS, 3.4 * RADIUS], material=2)]
+        bond = law("a", "bonded", bond_strength=1e6 * MASS, bond_friction=1.0, bond_distance=0.2 * RADIUS)
+        record = self.play("one too deep", grains, [], None, 40, material=named("a", "b"), law=[bond], solver=DEFAULTS, output={"every": 40})
+        self.assertIn("projected in ", record.run.stdout)
+        apart = np.linalg.norm(record.position[:, [0, 1, 2]] - record.position[:, [1, 2, 0]], axis=2)
+        self.verify("a body of bonded disks that is projected", "distances of its disks [m]", apart[-1], apart[0], 1e-4 * RADIUS)
+        self.assertGreater(record.position[-1, 3, 1] - record.position[-1, 2, 1], 1.97 * RADIUS)
+
     def test_chain(self):
         """Three disks in a row are hinged to each other, and stay a row: 3 turns with 0.094 rad in a step."""
         places = np.array([[-2.0 * RADIUS, 0.0], [0.0, 0.0], [2.0 * RADIUS, 0.0]])

@@ -58,6 +58,7 @@ module gravier_boundary
     procedure :: half_width => boundary_half_width
     procedure :: find_image
     procedure :: locate => boundary_locate
+    procedure :: has_corners => boundary_has_corners
     procedure :: find_corners => boundary_find_corners
     procedure :: velocity_at => boundary_velocity_at
     procedure :: last_velocity_at => boundary_last_velocity_at
@@ -227,6 +228,15 @@ contains
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
 
+  !> Whether its surface is a segment or a rectangle.
+  pure logical function boundary_has_corners(self)
+    class(boundary_t), intent(in) :: self
+
+    boundary_has_corners = allocated(self%surface)
+    if (boundary_has_corners) boundary_has_corners = .not. (self%surface%is%endless .or. self%surface%is%faceted) .and. &
+      & any(abs(self%surface%edge) > 0.0_dp)
+  end function boundary_has_corners
+
   !> The corners of a surface that ends, in order around it, from a point: two of a segment, four of a rectangle; none of what goes
   !> on for ever, is round or has facets.
   pure subroutine boundary_find_corners(self, x, n, corners)
@@ -240,8 +250,7 @@ contains
 
     n = 0
     corners(:, :) = 0.0_dp
-    if (self%surface%is%endless .or. self%surface%is%faceted) return
-    if (.not. any(abs(self%surface%edge) > 0.0_dp)) return
+    if (.not. self%has_corners()) return
     call find_image(self, x, from)
     n = merge(2, 4, .not. any(abs(self%surface%edge(:, 2)) > 0.0_dp))
     corners(:, 1) = self%surface%point - from

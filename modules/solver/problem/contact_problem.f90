@@ -81,6 +81,8 @@ module gravier_contact_problem
     real(dp), allocatable :: attraction(:, :), attraction_load(:, :)
     !> where some law of the scene has springs: those of each contact (n_contacts)
     type(spring_step_t), allocatable :: spring(:)
+    !> where some law of the scene has bonds: whether an intact one holds the contact (n_contacts)
+    logical, allocatable :: joins(:)
     !> largest product of the step and the frequency sqrt(k W_nn) of a normal spring
     real(dp) :: stiffest = 0.0_dp
     !> gap at q_m (n_contacts) [m]
@@ -97,6 +99,7 @@ module gravier_contact_problem
     procedure :: product_of => subproblem_product_of
     procedure :: normal_impulse => subproblem_normal_impulse
     procedure :: yields => subproblem_yields
+    procedure :: is_bonded => subproblem_is_bonded
     procedure :: overlap => subproblem_overlap
     procedure :: contact_reaction => subproblem_contact_reaction
     procedure :: free_velocity => subproblem_free_velocity
@@ -239,15 +242,25 @@ contains
     if (allocated(self%spring)) yields = self%spring(c)%spring%yields()
   end function subproblem_yields
 
-  !> Largest overlap of the contacts that yield, or of those that are rigid; 0 where there is none [m].
+  !> Whether an intact bond holds contact `c`: its overlap is the length that it had when it was made, and no error.
+  pure logical function subproblem_is_bonded(self, c) result(is_bonded)
+    class(subproblem_t), intent(in) :: self
+    integer, intent(in) :: c
+
+    is_bonded = .false.
+    if (allocated(self%joins)) is_bonded = self%joins(c)
+  end function subproblem_is_bonded
+
+  !> Largest overlap of the contacts that yield, or of those that are rigid and not bonded; 0 where there is none [m].
   pure real(dp) function subproblem_overlap(self, yielding) result(overlap)
     class(subproblem_t), intent(in) :: self
     logical, intent(in) :: yielding
     integer :: c
 
     overlap = 0.0_dp
-    if (allocated(self%spring)) then
+    if (allocated(self%spring) .or. allocated(self%joins)) then
       do c = 1, self%n_contacts
+        if (self%is_bonded(c)) cycle
         if (self%yields(c) .eqv. yielding) overlap = max(overlap, -self%gap(c))
       end do
     else if (self%n_contacts > 0 .and. .not. yielding) then

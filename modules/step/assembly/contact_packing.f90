@@ -376,10 +376,12 @@ contains
     logical :: known, joins
     integer :: c
 
+    allocate (sub%joins(found%n))
     call find_bonded_groups(view, boundaries, physics, found, groups)
     do c = 1, found%n
       call find_packed(view, found, c, this)
       joins = found%terms(this%f)%joins
+      sub%joins(c) = joins
       call groups%find_spin(view, boundaries, found, this%f, known, spin)
       if (.not. (known .or. joins)) cycle
       place = place_of(view, found, this%f, joins)

@@ -7,6 +7,7 @@ module gravier_narrow_phase
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
+  use gravier_wall_joints, only: has_other, may_join
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
@@ -79,9 +80,11 @@ contains
     type(shape_work_t) :: work
     integer :: w, p, i, j, c, nd
     real(dp) :: branch(decomposition%nd), distance, gap, alert
+    logical :: walls_join
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
+    walls_join = may_join(decomposition%boundaries)
     call work%init(nd, physics%h, counts=.false.)
     do w = 1, view%list%n_watched()
       p = view%list%watched_place(w)
@@ -105,12 +108,15 @@ contains
       else
         if (.not. decomposition%boundaries(-j)%present) cycle
         if (decomposition%boundaries(-j)%is_faceted()) then
-          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, work, found)
+          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, walls_join, work, found)
           cycle
         end if
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, found%normal(:, c))
         gap = distance - view%bodies%radius(i)
         if (is_far(view%list, p, gap, alert)) cycle
+        if (walls_join .and. .not. remembers(view%list, p)) then
+          if (has_other(decomposition%boundaries, decomposition%rule%filter, view%bodies, i, -j, gap, found%normal(:, c))) cycle
+        end if
       end if
       found%source(c) = p
       found%gap(c) = gap
@@ -119,11 +125,13 @@ contains
   end subroutine find_round_contacts
 
   !> The contacts of a disk or a sphere with a boundary of facets, whose pair begins at place `p`.
-  subroutine find_facet_contacts(view, decomposition, physics, p, work, found)
+  subroutine find_facet_contacts(view, decomposition, physics, p, walls_join, work, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
+    !> other boundaries may make one wall with this one
+    logical, intent(in) :: walls_join
     type(shape_work_t), intent(inout) :: work
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
@@ -133,6 +141,12 @@ contains
     call carry_memory(points, p, view%list)
     do k = 1, points%n
       call write_point(points, k, p, found)
+      if (walls_join .and. .not. remembers(view%list, p + k - 1)) then
+        associate (c => found%n + 1)
+          if (has_other(decomposition%boundaries, decomposition%rule%filter, view%bodies, view%list%candidate(p), &
+            & -view%list%antagonist(p), found%gap(c), found%normal(:, c))) cycle
+        end associate
+      end if
       call add_contact(view, decomposition, physics, found)
     end do
     found%overlapping_cores = found%overlapping_cores + points%overlapping_cores
@@ -204,8 +218,17 @@ contains
     real(dp), intent(in) :: gap, alert
 
     is_far = gap > alert
-    if (is_far .and. list%memory%law_row > 0) is_far = list%state(list%memory%law_row, p) == 0
+    if (is_far) is_far = .not. remembers(list, p)
   end function is_far
+
+  !> Whether the law of a pair has something to remember: a bond, or a bridge.
+  pure logical function remembers(list, p)
+    type(neighbour_list_t), intent(in) :: list
+    integer, intent(in) :: p
+
+    remembers = .false.
+    if (list%memory%law_row > 0) remembers = list%state(list%memory%law_row, p) /= 0
+  end function remembers
 
   !> Add the contact that was written behind the last one of the list, within the alert distance or with something to remember,
   !> if it is one under its law.

@@ -2,11 +2,17 @@
 module gravier_wall_joints
   use gravier_kinds, only: dp
   use gravier_facet, only: near_facets_t
-  use gravier_facet_candidates, only: rises
+  use gravier_facet_candidates, only: rises, has_point
+  use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
+  use gravier_material_filter, only: material_filter_t
   implicit none
   private
-  public :: is_in_joint
+  public :: is_in_joint, has_other, may_join
+
+  !> Of disks and spheres: distance below which edges of walls meet, and below which two contacts are one, in radii; sine of the
+  !> slope below which a wall is flat. The last is larger than the slope between two contacts that are one: never are both left out.
+  real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 1.0e-6_dp, flat = 4.0e-6_dp
 
 contains
 
@@ -20,30 +26,127 @@ contains
     real(dp), intent(in) :: point(:), normal(3)
     !> distance below which points are one [m]; sine of the slope below which a wall is flat
     real(dp), intent(in) :: tolerance, slack
-    type(near_facets_t) :: near
-    real(dp), parameter :: here(3) = [0.0_dp, 0.0_dp, 0.0_dp]
-    real(dp) :: corners(3, 4)
-    integer :: k, f, n
+    logical :: has_it
+    integer :: k
 
     in_joint = .false.
     do k = 1, size(boundaries)
       if (in_joint) return
       if (k == j .or. .not. boundaries(k)%touches()) cycle
-      if (boundaries(k)%is_faceted()) then
-        call boundaries(k)%find_facets(point, tolerance, near)
-        do f = 1, near%n
-          in_joint = in_joint .or. rises(near%corner(:, :, f), normal, here, tolerance, slack)
-        end do
-      else
-        call boundaries(k)%find_corners(point, n, corners)
-        if (n == 2) in_joint = rises(corners(:, 1:2), normal, here, tolerance, slack)
-        if (n < 4) cycle
-        ! the two triangles of a rectangle
-        in_joint = rises(corners(:, 1:3), normal, here, tolerance, slack)
-        corners(:, 2) = corners(:, 4)
-        in_joint = in_joint .or. rises(corners(:, 1:3), normal, here, tolerance, slack)
-      end if
+      call meet_at(boundaries(k), point, normal, tolerance, slack, has_it, in_joint)
     end do
   end function is_in_joint
+
+  !> Whether several boundaries may make one wall: segments, rectangles and meshes.
+  pure logical function may_join(boundaries)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer :: b, n
+
+    n = 0
+    do b = 1, size(boundaries)
+      if (.not. boundaries(b)%touches()) cycle
+      if (boundaries(b)%has_corners() .or. boundaries(b)%is_faceted()) n = n + 1
+    end do
+    may_join = n > 1
+  end function may_join
+
+  !> Whether a contact of a disk or a sphere with a segment, a rectangle or a mesh is none, because the wall goes on with another
+  !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. A mesh keeps it, else the first.
+  logical function has_other(boundaries, filter, bodies, i, j, gap, normal)
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> which pairs do not meet
+    type(material_filter_t), intent(in) :: filter
+    type(body_set_t), intent(in) :: bodies
+    !> the body, and the boundary
+    integer, intent(in) :: i, j
+    !> [m], (nd) unit vector towards the body
+    real(dp), intent(in) :: gap, normal(:)
+    real(dp) :: point(size(normal)), corners(3, 4), towards(3), radius
+    logical :: has_it, rises_there, is_faceted
+    integer :: k, n
+
+    has_other = .false.
+    is_faceted = boundaries(j)%is_faceted()
+    if (.not. (is_faceted .or. boundaries(j)%has_corners())) return
+    radius = bodies%radius(i)
+    point(:) = bodies%position(:, i) - (gap + radius)*normal
+    if (.not. is_faceted) then
+      call boundaries(j)%find_corners(point, n, corners)
+      if (.not. is_on_rim(corners(:, 1:n), one_edge*radius)) return
+    end if
+    towards(:) = 0.0_dp
+    towards(1:size(normal)) = normal
+    do k = 1, size(boundaries)
+      if (k == j .or. .not. boundaries(k)%touches()) cycle
+      if (filter%lets_pass(bodies, boundaries, i, -k)) cycle
+      call meet_at(boundaries(k), point, towards, one_edge*radius, flat, has_it, has_other)
+      if (has_other) return
+      if (.not. has_it .or. (is_faceted .and. .not. boundaries(k)%is_faceted())) cycle
+      if (k > j .and. (is_faceted .or. .not. boundaries(k)%is_faceted())) cycle
+      call meet_at(boundaries(k), point, towards, one_place*radius, flat, has_other, rises_there)
+      if (has_other) return
+    end do
+  end function has_other
+
+  !> Whether the origin lies on the rim of a segment or a rectangle with these corners, in order around it.
+  pure logical function is_on_rim(corners, tolerance)
+    !> (3, 2 or 4) [m]
+    real(dp), intent(in) :: corners(:, :)
+    real(dp), intent(in) :: tolerance
+    real(dp) :: side(3), share
+    integer :: c, n
+
+    is_on_rim = .false.
+    n = size(corners, 2)
+    do c = 1, n
+      side(:) = 0.0_dp
+      if (n == 4) side(:) = corners(:, mod(c, n) + 1) - corners(:, c)
+      share = 0.0_dp
+      if (n == 4) share = min(max(-dot_product(corners(:, c), side)/max(sum(side**2), tiny(1.0_dp)), 0.0_dp), 1.0_dp)
+      is_on_rim = is_on_rim .or. norm2(corners(:, c) + share*side) <= tolerance
+    end do
+  end function is_on_rim
+
+  !> Whether a boundary has a point, within a tolerance, and whether it rises from it along a normal.
+  pure subroutine meet_at(boundary, point, normal, tolerance, slack, has_it, rises_there)
+    type(boundary_t), intent(in) :: boundary
+    !> (nd) [m]; (3) unit vector
+    real(dp), intent(in) :: point(:), normal(3)
+    !> [m], and the sine of the slope below which a wall is flat
+    real(dp), intent(in) :: tolerance, slack
+    logical, intent(out) :: has_it, rises_there
+    type(near_facets_t) :: near
+    real(dp) :: corners(3, 4)
+    integer :: f, n
+
+    has_it = .false.
+    rises_there = .false.
+    if (boundary%is_faceted()) then
+      call boundary%find_facets(point, tolerance, near)
+      do f = 1, near%n
+        call look(near%corner(:, :, f), normal, tolerance, slack, has_it, rises_there)
+      end do
+    else
+      call boundary%find_corners(point, n, corners)
+      if (n == 2) call look(corners(:, 1:2), normal, tolerance, slack, has_it, rises_there)
+      if (n < 4) return
+      ! the two triangles of a rectangle
+      call look(corners(:, 1:3), normal, tolerance, slack, has_it, rises_there)
+      corners(:, 2) = corners(:, 4)
+      call look(corners(:, 1:3), normal, tolerance, slack, has_it, rises_there)
+    end if
+  end subroutine meet_at
+
+  !> The same of one facet, seen from the point, beside what is known of others.
+  pure subroutine look(corner, normal, tolerance, slack, has_it, rises_there)
+    !> (3, 2 or 3) [m]
+    real(dp), intent(in), contiguous :: corner(:, :)
+    real(dp), intent(in) :: normal(3), tolerance, slack
+    logical, intent(inout) :: has_it, rises_there
+    real(dp), parameter :: here(3) = [0.0_dp, 0.0_dp, 0.0_dp]
+
+    has_it = has_it .or. has_point(corner, here, tolerance)
+    rises_there = rises_there .or. rises(corner, normal, here, tolerance, slack)
+  end subroutine look
 
 end module gravier_wall_joints

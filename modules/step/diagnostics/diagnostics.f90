@@ -2,6 +2,7 @@
 !> kept.
 module gravier_diagnostics
   use gravier_kinds, only: dp, i8
+  use gravier_timers, only: start_timer, stop_timer, phase_diagnostics
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_features_t, solved_step_t, column_list_t, histogram_t, in_each_step, name_length
@@ -99,9 +100,11 @@ contains
     integer :: k
 
     if (.not. allocated(self%asked)) return
+    call start_timer(phase_diagnostics)
     do k = 1, size(self%asked)
       call self%asked(k)%diagnostic%take_step(step)
     end do
+    call stop_timer(phase_diagnostics)
   end subroutine diagnostics_take_step
 
   !> Whether some diagnostic looks at each step.
@@ -125,6 +128,7 @@ contains
     integer :: k
 
     if (.not. allocated(self%asked)) return
+    call start_timer(phase_diagnostics)
     do k = 1, size(self%asked)
       associate (one => self%asked(k))
         one%measured = written .or. one%features%measures == in_each_step
@@ -132,6 +136,7 @@ contains
       end associate
     end do
     call self%fill()
+    call stop_timer(phase_diagnostics)
   end subroutine diagnostics_measure
 
   !> Names and values of all columns.

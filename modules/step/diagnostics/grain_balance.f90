@@ -25,6 +25,9 @@ module gravier_grain_balance
     real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
     !> kinetic energy of grains that were taken out of the scene, less that of grains that entered
     real(dp) :: carried_away = 0.0_dp
+    !> what counts of the kinetic energy for rest: of disks and spheres without their spins, since a spin about the normal of the only
+    !> contact of a grain may last for ever and moves nothing
+    real(dp) :: moving = 0.0_dp
     !> sum of their speeds now [m/s]
     real(dp) :: speeds = 0.0_dp
     !> sums of m v [kg m/s] and, with a body force, of V v [m^4/s] now
@@ -37,7 +40,7 @@ module gravier_grain_balance
   end type grain_balance_t
 
   !> places among the sums of a step; behind `in_momentum` and `in_flux` come three
-  integer, parameter :: in_kinetic = 1, in_momentum = 1, in_flux = 4, in_contacts = 8, in_speeds = 9, n_sums = 9
+  integer, parameter :: in_kinetic = 1, in_momentum = 1, in_flux = 4, in_contacts = 8, in_speeds = 9, in_moving = 10, n_sums = 10
 
 contains
 
@@ -126,6 +129,7 @@ contains
     real(dp), intent(in) :: sums(n_sums)
 
     self%kinetic = sums(in_kinetic)
+    self%moving = sums(in_moving)
     self%speeds = sums(in_speeds)
     self%momentum(:) = sums(in_momentum + 1:in_momentum + 3)
     self%flux(:) = sums(in_flux + 1:in_flux + 3)
@@ -166,7 +170,9 @@ contains
     square = sum(bodies%velocity(1:nd, k)**2)
     part(in_kinetic) = part(in_kinetic) + 0.5_dp*bodies%mass(k)*square
     part(in_speeds) = part(in_speeds) + sqrt(square)
+    part(in_moving) = part(in_moving) + 0.5_dp*bodies%mass(k)*square
     call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_kinetic))
+    if (bodies%no > 0) call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_moving))
     do d = 1, nd
       part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)
     end do

@@ -21,6 +21,11 @@ module gravier_overlap_projection
   real(dp), parameter :: remainder = 0.1_dp
   !> gap of a contact that is left out, over the overlap allowed
   real(dp), parameter :: out_of_reach = 1.0e9_dp
+  !> what bonds may pull with, over the mass that they move times the overlap allowed
+  real(dp), parameter :: strength = 1.0e6_dp
+  !> times a change of the length of a bond counts in the excess: what sweeps leave of overlaps is for the next steps, what they leave
+  !> of bonds stays
+  real(dp), parameter :: weight_of_bonds = 100.0_dp
 
   !> What a projection borrows of a subproblem, its work space, and what it sweeps; src/report/memory_report.f90 counts them.
   type :: borrowed_t
@@ -42,7 +47,8 @@ contains
   !> n.(d_i - d_j) + gap + allowed >= 0, in all subdomains with shared masses as in NSCDD; for boundaries, see
   !> weigh_boundaries. They are scaled down together so that nothing moves by more than half the alert distance (or
   !> `allowed`): what is no contact now cannot come to overlap. Boundaries that move as prescribed, and such components, stay.
-  !> Compliant contacts are left out: their overlap is deformation.
+  !> Compliant contacts are left out: their overlap is deformation. Contacts that intact bonds hold keep the gaps that they have, in
+  !> either direction: p >= -P with a P that no displacement needs.
   !> Sweeps go over the contacts that overlap too much and over those of bodies that have moved. All others would give nothing: they
   !> have room, and nothing has moved there.
   !> The problem comes back as it was but for velocities, masses and local operators, with the lengths of the displacements of all
@@ -145,11 +151,11 @@ contains
     end do
   end subroutine take_blocks
 
-  !> Largest overlap beyond what is allowed under the displacements of now [m]. Collective.
+  !> Largest overlap beyond what is allowed, and change of the length of a bond, under the displacements of now [m]. Collective.
   real(dp) function excess(problem, borrowed)
     type(contact_problem_t), intent(in) :: problem
     type(borrowed_t), intent(inout) :: borrowed(:)
-    integer :: s, k, nd
+    integer :: s, k, c, nd
 
     nd = problem%kernels%nd
     excess = 0.0_dp
@@ -161,6 +167,10 @@ contains
               & sub%velocity, borrowed(s)%work(:, :, first:last))
             ! lanes without a contact hold zeros
             excess = max(excess, -minval(borrowed(s)%work(:, 1, first:last) + sub%hot(:, nd + 1, first:last)))
+            if (.not. allocated(sub%joins)) cycle
+            do c = (first - 1)*lanes + 1, min(last*lanes, sub%n_contacts)
+              if (sub%joins(c)) excess = max(excess, weight_of_bonds*abs(borrowed(s)%work(lane_of(c), 1, block_of(c))))
+            end do
           end associate
         end do
       end associate
@@ -229,7 +239,7 @@ contains
         associate (gap => sub%hot(lane_of(c), nd + 1, block_of(c)))
           gap = sub%gap(c) + h*borrowed%work(lane_of(c), 1, block_of(c)) + allowed
           if (sub%yields(c)) gap = out_of_reach*allowed
-          if (gap < 0.0_dp) then
+          if (gap < 0.0_dp .and. .not. sub%is_bonded(c)) then
             borrowed%is_touched(sub%pair(1, c)) = .true.
             borrowed%is_touched(sub%pair(2, c)) = .true.
           end if
@@ -243,12 +253,30 @@ contains
       end if
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :, :) = 0.0_dp
+      if (allocated(sub%joins)) call hold_bonds(nd, allowed, sub)
       do b = 1, sub%n_bodies
         sub%weight(:, b) = sub%multiplicity(b)*sub%inverse_mass(:, b)
       end do
       sub%weight(:, sub%n_bodies + 1:) = sub%inverse_mass(:, sub%n_bodies + 1:)
     end associate
   end subroutine lend
+
+  !> Let bonds pull as well as press. Sweeps keep r~ = p + P >= 0, and add what they change of it to the displacements.
+  subroutine hold_bonds(nd, allowed, sub)
+    integer, intent(in) :: nd
+    !> [m]
+    real(dp), intent(in) :: allowed
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: lightness
+    integer :: c
+
+    do c = 1, sub%n_contacts
+      if (.not. sub%is_bonded(c)) cycle
+      sub%hot(lane_of(c), nd + 1, block_of(c)) = 0.0_dp
+      lightness = max(maxval(sub%inverse_mass(1:nd, sub%pair(1, c))), maxval(sub%inverse_mass(1:nd, sub%pair(2, c))))
+      if (lightness > 0.0_dp) sub%impulse(lane_of(c), 1, block_of(c)) = strength*allowed/lightness
+    end do
+  end subroutine hold_bonds
 
   !> Undo `lend`, but for masses and velocities.
   subroutine give_back(problem, s, borrowed)

@@ -5,7 +5,8 @@ program test_timers
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_timers, only: start_timer, stop_timer, reset_timers, gather_timers, phase_names, n_phases, &
     & phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, phase_sweep, phase_exchange, &
-    & phase_factorise, phase_interface_solve, phase_check, phase_reduction, phase_projection, phase_output
+    & phase_factorise, phase_interface_solve, phase_check, phase_reduction, phase_projection, phase_diagnostics, &
+    & phase_output
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   !> seconds that a phase takes at least on rank 0
@@ -36,7 +37,7 @@ contains
   subroutine test_phases()
     integer, parameter :: phases(*) = [phase_bodies, phase_neighbourhood, phase_detection, phase_interface, phase_setup, &
       & phase_sweep, phase_exchange, phase_factorise, phase_interface_solve, phase_check, phase_reduction, phase_projection, &
-      & phase_output]
+      & phase_diagnostics, phase_output]
     integer :: k, j
 
     call check_equal(size(phases), n_phases, "number of phases")

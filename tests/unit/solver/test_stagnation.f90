@@ -52,19 +52,12 @@ contains
     end do
   end function first_due
 
-  !> A method of direct solves does not wait for waves, and nothing follows it.
+  !> Nothing follows a method of direct solves.
   subroutine check_direct()
     type(stagnation_t) :: stagnation
-    type(contact_problem_t) :: empty
-    logical :: stagnates, in_vain, due
 
-    allocate (empty%sub(0))
     stagnation%patience = 40
     call check(.not. stagnation%may_begin_last(60, 1), "no plain iterations follow direct solves")
-    call stagnation%note(empty, 100, [1.0_dp, 1.0_dp], .true., 0.0_dp, due)
-    call stagnation%note(empty, 200, [1.0_dp, 1.0_dp], .true., 0.0_dp, due)
-    call stagnation%judge(empty, 250, 10**6, stagnates, in_vain)
-    call check(stagnates .and. .not. in_vain, "a direct solve does not wait for waves")
   end subroutine check_direct
 
   !> Plain iterations that come last, after 1500 others, are as many and 2000 more, whatever they gain. They are tried where a load

@@ -224,25 +224,25 @@ contains
     solve%velocity_error = 0.02_dp
     solve%velocity_scale = 0.1_dp
     solve%residual = 2e-2_dp
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 0.5_dp)
     ! reached another criterion: out of the accuracy, then too soon to tell, twice
     solve%accurate = .false.
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 0.5_dp)
     solve%judged = .false.
-    call tally%add_solve(solve, "load of a step")
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 0.5_dp)
+    call tally%add_solve(solve, "load of a step", 0.5_dp)
     ! a pass over layers that the solve went on from, then one that it did not
     solve%layered_sweeps = 1.5_dp
     solve%layered = .true.
     solve%status = solve_stagnated
     solve%velocity_error = 0.06_dp
     solve%residual = 1e-2_dp
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 0.5_dp)
     solve%layered = .false.
     solve%status = solve_diverged
     solve%velocity_error = 1e9_dp
     solve%velocity_scale = 0.4_dp
-    call tally%add_solve(solve, "speeds")
+    call tally%add_solve(solve, "speeds", 0.5_dp)
     call check_equal(int(tally%solves), 6, "solves")
     call check_equal(int(tally%inaccurate), 1, "out of the accuracy")
     call check_equal(int(tally%unjudged), 2, "ended too soon to tell")
@@ -263,8 +263,11 @@ contains
     call tally%add_step(0.1_dp, interface_statistics_t(overlapping_cores=4, stretched_bonds=2), .false., 0.0_dp, 2.0_dp, &
       & 2.0_dp)
     call check_equal(int(tally%unresolved), 0, "motions that are told from the errors of their solves")
-    ! the velocity error of the last solve is 0.06 m/s
+    ! the velocity error of the last solve is 0.06 m/s, and bodies had 0.5 m/s before it; then 0.1 m/s
     call tally%add_step(0.5_dp, interface_statistics_t(overlapping_cores=3, points_left_out=7), .false., 0.2_dp, 3.0_dp, 40.0_dp)
+    call check_equal(int(tally%unresolved), 0, "another one")
+    tally%own_velocity = 0.1_dp
+    call tally%add_step(0.1_dp, interface_statistics_t(), .false., 0.0_dp, 3.0_dp, 40.0_dp)
     call check_equal(int(tally%unresolved), 1, "a motion that is not")
     call check_close(tally%drift, 2.4_dp, 1e-12_dp, "no more of it than the error can be")
     call tally%add_step(0.1_dp, interface_statistics_t(), .false., 0.0_dp, 0.5_dp, 10.0_dp)
@@ -277,11 +280,11 @@ contains
     call check_equal(int(tally%most_cores), 4, "the most pairs in one of them")
     call check_equal(int(tally%steps_stretched), 1, "steps in which bonds were stretched")
     call check_equal(int(tally%most_stretched), 2, "the most bonds in one of them")
-    call check_close(tally%mended_share(), 1.0_dp/5.0_dp, 1e-12_dp, "share of steps with projections")
+    call check_close(tally%mended_share(), 1.0_dp/6.0_dp, 1e-12_dp, "share of steps with projections")
     call check_close(tally%start_overlap, 0.3_dp, 0.0_dp, "overlap of the start")
     call check_close(tally%later_overlap, 0.5_dp, 0.0_dp, "overlap of later steps")
     call check_close(tally%shift, 0.3_dp, 1e-12_dp, "shifts")
-    call check_close(tally%path, 6.5_dp, 1e-12_dp, "paths")
+    call check_close(tally%path, 9.5_dp, 1e-12_dp, "paths")
     call check(.not. tally%overlaps_grew(0.1_dp), "0.5 is less than twice that of the start")
     tally%later_overlap = 0.61_dp
     call check(tally%overlaps_grew(0.1_dp), "more than twice that of the start")

@@ -5,13 +5,14 @@ program test_wall_joints
   use gravier_manifold, only: manifold_t
   use gravier_surface_registry, only: make_surface
   use gravier_facet_contacts, only: keep_corners
-  use gravier_wall_joints, only: is_in_joint
+  use gravier_wall_joints, only: is_in_joint, may_join
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: tolerance = 1.0e-7_dp, slack = 1.0e-3_dp
   real(dp), parameter :: up(3) = [0.0_dp, 1.0_dp, 0.0_dp], leans(3) = [-0.6_dp, 0.8_dp, 0.0_dp]
 
   call test_segments()
+  call test_walls_that_join()
   call test_rectangles()
   call test_corners_that_stay()
   call finish_checks()
@@ -65,6 +66,26 @@ contains
     call wall(2)%surface%take_facets(line)
     call check(is_in_joint(wall, 1, joint, up, tolerance, slack), "a mesh upwards")
   end subroutine test_segments
+
+  !> One boundary joins nothing, two that end may, and what is taken away or goes on for ever does not.
+  subroutine test_walls_that_join()
+    type(boundary_t) :: wall(2)
+    real(dp) :: edge(3, 2)
+
+    edge(:, :) = 0.0_dp
+    edge(1, 1) = 1.0_dp
+    call put("segment", [0.0_dp, 0.0_dp, 0.0_dp], edge, wall(1))
+    call check(.not. may_join(wall(1:1)), "one segment")
+    call put("segment", [1.0_dp, 0.0_dp, 0.0_dp], edge, wall(2))
+    call check(may_join(wall), "two segments")
+    wall(2)%present = .false.
+    call check(.not. may_join(wall), "one is taken away")
+    wall(2)%present = .true.
+    call make_surface("plane", wall(2)%surface)
+    call check(.not. may_join(wall), "a segment and a plane")
+    call make_surface("mesh", wall(2)%surface)
+    call check(may_join(wall), "a segment and a mesh")
+  end subroutine test_walls_that_join
 
   !> Both triangles of a rectangle rise from its edge.
   subroutine test_rectangles()
