@@ -25,8 +25,8 @@ module gravier_grain_balance
     real(dp) :: load_work = 0.0_dp, contact_work = 0.0_dp
     !> kinetic energy of grains that were taken out of the scene, less that of grains that entered
     real(dp) :: carried_away = 0.0_dp
-    !> what counts of the kinetic energy for rest: of disks and spheres without their spins, since a spin about the normal of the only
-    !> contact of a grain may last for ever and moves nothing
+    !> what counts of the kinetic energy for rest: of disks and spheres without their spins, since a spin about the normal of the
+    !> only contact of a grain may last for ever and moves nothing
     real(dp) :: moving = 0.0_dp
     !> sum of their speeds now [m/s]
     real(dp) :: speeds = 0.0_dp

@@ -23,8 +23,8 @@ module gravier_overlap_projection
   real(dp), parameter :: out_of_reach = 1.0e9_dp
   !> what bonds may pull with, over the mass that they move times the overlap allowed
   real(dp), parameter :: strength = 1.0e6_dp
-  !> times a change of the length of a bond counts in the excess: what sweeps leave of overlaps is for the next steps, what they leave
-  !> of bonds stays
+  !> times a change of the length of a bond counts in the excess: what sweeps leave of overlaps is for the next steps, what they
+  !> leave of bonds stays
   real(dp), parameter :: weight_of_bonds = 100.0_dp
 
   !> What a projection borrows of a subproblem, its work space, and what it sweeps; src/report/memory_report.f90 counts them.
