@@ -7,6 +7,8 @@ GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
 #: shifts are small, the velocity error over U
 OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
+#: overlaps, in mean radii, up to which grains are where they should be, and beyond which they are in each other
+SHALLOW, DEEP = 0.02, 0.1
 #: the question whose answer says nothing of the run
 FILES = "Are its files there and whole?"
 #: the parts of the energy turned over up to which a balance is one, and up to which it is nearly one
@@ -77,12 +79,25 @@ def accurate(log, history, solver):
             missed, above = int((history.converged == 0).sum()), int((ratio[history.converged == 0] > goal).sum())
             beside = "" if above == missed else f", and in {missed - above} more what else the criterion asks for was missed"
             return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}; it was above it in {above} steps{beside}.")
+        if log.value("drift"):
+            return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}, with a goal of {goal:g}; {log.value('drift')}.")
         return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}, with a goal of {goal:g}.")
     grade = GOOD if worst <= 0.1 else DOUBT if worst <= FAR_OFF else BAD
     return Answer(question, grade, f"The criterion '{solver.get('criterion')}' does not bound it; as estimated, {words}.")
 
 
 def projected(log, history):
+    """How often overlaps were projected, and how deep the deepest of the run was."""
+    answer = how_often_projected(log, history)
+    depth = re.search(r"later at most \S+ m, (\S+) of ", log.value("overlaps"))
+    if depth and answer.grade != BAD and float(depth[1]) > SHALLOW:
+        deep = float(depth[1]) > DEEP
+        return Answer(answer.question, BAD if deep else max(answer.grade, DOUBT, key=[GOOD, DOUBT, BAD, UNKNOWN].index),
+                      f"{answer.text} It is {'deep' if deep else 'more than is usual'}: {depth[1]} of the mean radius.")
+    return answer
+
+
+def how_often_projected(log, history):
     """As the log counts projections at its end, which leaves out those that shift by rounding, and weighs them by the paths of grains; of
     steps that it does not know, before its end or before a restart, as history.csv counts them."""
     question = "Were overlaps projected?"

@@ -22,6 +22,8 @@ module gravier_step_figures
     integer(i8) :: contacts = 0
     !> grains that left by an outlet; grains that move by more than half of their thickness, a ball by its radius, in a step
     integer(i8) :: left = 0, fast = 0
+    !> mass of those that left [kg]
+    real(dp) :: left_mass = 0.0_dp
     !> where bodies have shapes, contacts that are pressed deep for the thinner body
     type(deep_contacts_t) :: deep
     !> grains that have entered, and their mass [kg]

@@ -433,7 +433,6 @@ contains
     type(step_figures_t), intent(inout) :: figures
     type(local_bodies_t), allocatable :: before(:)
     integer(i8) :: n_glued
-    real(dp) :: left_mass
     logical :: remembered
 
     if (self%halo%builds > 0) call self%halo%refresh(self%decomposition)
@@ -442,8 +441,8 @@ contains
       if (.not. some_leave(self%decomposition)) return
       call drop_grains(self%decomposition, self%halo)
     end if
-    call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued, left_mass)
-    self%left_mass = self%left_mass + left_mass
+    call remove_grains(self%decomposition, self%n_glued > 0, figures%left, n_glued, figures%left_mass)
+    self%left_mass = self%left_mass + figures%left_mass
     if (figures%left > 0 .or. figures%entered > 0) self%mass = self%decomposition%free_mass()
     self%n_grains = self%n_grains - figures%left - n_glued
     self%n_glued = self%n_glued - n_glued

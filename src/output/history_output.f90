@@ -89,6 +89,7 @@ contains
     header = "step,time,contacts,iterations,sweeps,residual,velocity_error,velocity_scale,jump,max_overlap,"// &
       & "kinetic_energy,wall_seconds,interface_bodies,converged,grains,left,fast,listed,divided,projected,"// &
       & "exchange_messages,exchange_values,most_messages,most_values,ghosts,solve_seconds,sleeping,woken"
+    if (simulation%effects%removal) header = header//",left_mass"
     if (simulation%inflow%exists()) header = header//",entered,entered_mass"
     if (simulation%decomposition%period%moves) then
       do k = 1, simulation%decomposition%nd
@@ -143,6 +144,7 @@ contains
       call table%add(solve%seconds)
       call table%add(figures%asleep)
       call table%add(figures%tries - 1)
+      if (simulation%effects%removal) call table%add(figures%left_mass)
       if (simulation%inflow%exists()) then
         call table%add(figures%entered)
         call table%add(figures%entered_mass)

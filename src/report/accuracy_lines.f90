@@ -7,7 +7,7 @@ module gravier_accuracy_lines
   implicit none
   private
   public :: accuracy_lines, error_line, scale_range_line, drift_lines, drifts, overlap_lines, layer_line, creep_lines, &
-    & goal_name, goal_text, percent, plain
+    & goal_name, goal_text, mean_size_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 

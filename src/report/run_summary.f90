@@ -7,7 +7,7 @@ module gravier_run_summary
   use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
-  use gravier_accuracy_lines, only: goal_name, goal_text, drifts, percent, plain
+  use gravier_accuracy_lines, only: goal_name, goal_text, mean_size_name, drifts, percent, plain
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -18,6 +18,8 @@ module gravier_run_summary
   real(dp), parameter :: least_share = 3.0_dp
   !> part of the paths of grains below which their shifts by projections are small
   real(dp), parameter :: little = 0.01_dp
+  !> overlap of rigid contacts that is named, in mean radii, or halves of the mean thickness
+  real(dp), parameter :: deep = 0.1_dp
   !> contacts of rank 0 below which more ranks do not pay
   integer(i8), parameter :: contacts_a_rank = 5000
   !> velocity error over its scale that a looser goal may lead to
@@ -190,6 +192,8 @@ contains
           text = text//": the results are not those of the contact law"
         end if
       end if
+      if (tally%later_overlap > deep*simulation%mean_half_thickness .and. simulation%mean_half_thickness > 0.0_dp) text = text// &
+        & "; overlaps came to "//plain(tally%later_overlap/simulation%mean_half_thickness)//" of "//mean_size_name(simulation)
       if (drifts(simulation)) text = text//"; in "//to_text(tally%unresolved)//" of "//steps// &
         & " bodies moved by no more than the errors of solves, "//plain(tally%drift/simulation%velocity_scale%diameter)// &
         & " mean diameters in all: see `drift`"

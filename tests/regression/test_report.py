@@ -197,6 +197,24 @@ class Report(RunTestCase):
             self.assertEqual(answer.grade, grade, text)
             self.assertIn(words, answer.text)
 
+    def test_depth(self):
+        """Overlaps that are deep are no good sign, though none was projected."""
+        history = gravier.results.Table(step=np.arange(1, 5), max_overlap=np.full(4, 1e-4), projected=np.zeros(4))
+        for depth, grade in (("1.9E-02", "good"), ("2.1E-02", "doubt"), ("9.0E-02", "doubt"), ("4.8E-01", "bad")):
+            answer = verdict.projected(RunLog(f"overlaps    in the first step at most 0.00E+00 m, later at most 4.80E-03 m, {depth} of the mean radius\n"
+                                              "            no step projected overlaps\n"), history)
+            self.assertEqual(answer.grade, grade, answer.text)
+            self.assertEqual(f"{depth} of the mean radius" in answer.text, grade != "good")
+
+    def test_drift(self):
+        """Motion below the errors of solves casts doubt on an accuracy that was reached."""
+        history = gravier.results.Table(step=np.arange(1, 5), velocity_error=np.full(4, 1e-4), velocity_scale=np.full(4, 1e-2), converged=np.ones(4))
+        said = "in 4 of 4 steps bodies moved no faster than twice the velocity error of the solve, by 0.42 mean diameters in all"
+        for text, grade in (("", "good"), (f"drift       {said}\n            that motion may be nothing but errors\n", "doubt")):
+            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n" + text), history, {})
+            self.assertEqual(answer.grade, grade, answer.text)
+            self.assertEqual(said in answer.text, grade == "doubt")
+
     def test_too_fast(self):
         """What moved too far for the step is marked, as the last words have it."""
         table = gravier.results.Table(step=np.arange(1, 5), fast=np.array([0, 3, 1, 0]))

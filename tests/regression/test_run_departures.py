@@ -1,6 +1,7 @@
 """Grains that leave through an outlet while neighbour lists last: lists stay as they are for the others, on any ranks and through
 restarts, with the same bits."""
 import os
+import re
 import unittest
 
 import numpy as np
@@ -68,8 +69,12 @@ class Departures(LoopTestCase):
 
     def test_lists_last(self):
         """Grains leave in many steps, of which few make lists; each leaves in the step in whose middle it is behind."""
-        table = self.fall("straight", STEPS).history()
+        run = self.fall("straight", STEPS)
+        table = run.history()
         leaving = table["left"] > 0
+        np.testing.assert_array_equal(table["left_mass"] > 0, leaving)
+        gone = float(re.search(r"\ngrains .* mass \S+ \+ \S+ - (\S+) = ", run.stdout)[1])
+        self.assertAlmostEqual(table["left_mass"].sum(), gone, delta=1e-6 * gone)
         self.assertGreater(leaving.sum(), 15)
         self.assertGreater((leaving & (table["listed"] == 0)).sum(), 10)
         self.assertLess(table["listed"].sum(), STEPS / 3)

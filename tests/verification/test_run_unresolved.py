@@ -42,6 +42,14 @@ class Unresolved(SmallScene):
         self.assertNotIn("see `drift`", tight.run.stdout)
         self.assertLess(stays, 0.02 * RADIUS)
 
+    def test_deep(self):
+        """Overlaps that stay deep are named by the last line, those that are small are not."""
+        for depth in (0.3, 0.05):
+            pair = [Grain([0.0, 0.0], radius=RADIUS), Grain([(2.0 - depth) * RADIUS, 0.0], radius=RADIUS)]
+            record = self.play(f"deep {depth}", pair, [], (0.0, 0.0), 4, scene={"overlap_projection": False})
+            last = record.run.stdout.rstrip().splitlines()[-1]
+            self.assertEqual("; overlaps came to 0.30 of the mean radius; " in last, depth == 0.3, last)
+
     def test_what_moves_or_rests(self):
         """Grains that fall, come to rest and stay there for a second have no such line, and neither have grains on a belt that is slow."""
         pile = [Grain([0.11 * (k % 5), RADIUS + 0.11 * (k // 5)], radius=RADIUS) for k in range(25)]
