@@ -11,10 +11,11 @@ ROWS_PER_PERIOD = 200
 
 
 class Function:
-    """A driven value against time: constant, or its table of (time, value). A formula is a table up to the time `until` alone."""
+    """A driven value against time: constant, or its table of (time, value). A formula is a table up to the time `until` alone. Of one that
+    is a constant and a wave, `wave` has its mean, its amplitude, the angular frequency, above 0, and the phase at the first step."""
 
-    def __init__(self, constant=0.0, table=None, until=None):
-        self.constant, self.table, self.until = constant, table, until
+    def __init__(self, constant=0.0, table=None, until=None, wave=None):
+        self.constant, self.table, self.until, self.wave = constant, table, until, wave
 
     @staticmethod
     def of(entry, start, end):
@@ -42,7 +43,11 @@ class Function:
             times += list(np.arange(0.0, end - start, 2.0 * math.pi / abs(omega) / ROWS_PER_PERIOD))
         times = np.unique(times)
         values = (ct + amp * np.cos(omega * (times + start) + phi)) * np.minimum(1.0, rampi + ramp * (times + start))
-        return Function(table=np.stack([times, values], axis=1), until=end - start)
+        wave = None
+        if ramp == 0.0:
+            share = min(1.0, rampi)
+            wave = (share * ct, share * amp, abs(omega), math.copysign(1.0, omega) * phi + abs(omega) * start)
+        return Function(table=np.stack([times, values], axis=1), until=end - start, wave=wave)
 
     def same(self, other):
         return self.constant == other.constant and np.array_equal(*([] if one.table is None else one.table for one in (self, other)))

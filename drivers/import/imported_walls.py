@@ -13,8 +13,15 @@ def motion(case, body, whole):
     names = ("vx vy omega" if d == 2 else "vx vy vz wx wy wz").split()
     velocity, free, force = [0.0] * len(names), [False] * d, case.gravity[:d] * 0.0
     mass = case.bulks.mass_of(body)
+    swing, swings = [0.0] * len(names), None
     for k, name in enumerate(names):
         kind, function, entry = body.drives.get(k + 1, ("force", Function(), body.start))
+        # the first wave is the one that the boundary can have; others are tables, as are rotations about axes of a body in space
+        if kind == "vlocy" and function.wave and (k < d or d == 2) and swings in (None, function.wave[2:]):
+            velocity[k], amplitude, *swings = function.wave
+            swings = tuple(swings)
+            swing[k] = amplitude / swings[0]
+            continue
         if function.until is not None:
             case.remarks.append(f"formulas of drives are written up to the last step, {function.until:g} s, and constant afterwards: import with "
                                 "more --steps for a longer run")
@@ -44,11 +51,14 @@ def motion(case, body, whole):
         if not np.allclose(frame, np.eye(3)) and any(name in columns for name in names[3:]):
             body.start.refuse(f"body {body.rank} turns at a changing rate about axes that are not those of space", "a constant rate")
         spin = frame @ spin
+    if swings:
+        keys.update({name: part for name, part in (("oscillation", swing[:d]), ("rotation_oscillation", swing[d:])) if any(part)},
+                    frequency=swings[0] / (2.0 * np.pi), phase=swings[1])
     if any(velocity[:d]):
         keys["velocity"] = velocity[:d]
     if np.any(spin != 0.0):
         keys["rotation"] = list(spin)
-    if np.any(spin != 0.0) or any(name in columns for name in names[d:]):
+    if np.any(spin != 0.0) or any(swing[d:]) or any(name in columns for name in names[d:]):
         keys["pivot"] = list(body.centre(ShapeOfBody(body).centre) if body.contactors[0].words[0] in HULLS else body.place())
     if any(free):
         keys.update(free=free, mass=mass)

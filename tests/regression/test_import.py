@@ -209,6 +209,23 @@ class Import(RunTestCase):
         done = gravier("sample.nml", directory=self.scratch, program="gravier_sample")
         self.assertEqual(done.status, 0, done)
 
+    def test_waves(self):
+        """Waves of one frequency and phase are an oscillation, for ever; what has another frequency, or a ramp, is a table."""
+        bodies = body(2, 1, [0.0, 0.06], [("DISKx", "BLUEx", values(byrd=0.05))]) + body(2, 2, [0.0, 0.0], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
+        laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "DISKx", "BLUEx") + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
+        still_along = ("vlocy", 1, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+        for spin, is_table in ((("vlocy", 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0), False), (("vlocy", 3, 0.0, 1e-6, 31.0, 0.7, 1.0, 0.0), True)):
+            # down and up by 4 mm with 40 rad/s, which is below g, beside a rise of 0.05 m/s
+            drives = drive(2, 2, [still_along, ("vlocy", 2, 0.05, 0.16, -40.0, -0.7, 1.0, 0.0), spin])
+            folder, said = self.convert(self.box(2, bodies, laws, drives), steps=200)
+            self.assertEqual("formulas of drives are written up to the last step" in said, is_table)
+            with open(os.path.join(folder, "case.nml"), encoding="utf-8") as file:
+                self.assertRegex(file.read(), r"oscillation = 0\.0, 0\.004")
+            steps, _ = self.run_case(folder)
+            time = 0.2
+            way = 0.05 * time + 0.004 * (math.sin(40.0 * time + 0.7) - math.sin(0.7))
+            np.testing.assert_allclose(steps[-1]["position"][0], [0.0, 0.06 + way], atol=1e-4)
+
     def test_a_drum_and_a_moving_wall(self):
         """A disk falls onto the lowest point of a drum, another rides on a plate that rises by the ramp of its drive."""
         disk = [("DISKx", "BLUEx", values(byrd=0.05))]
