@@ -84,6 +84,17 @@ class Joints(SmallScene):
             record = self.play(name, [Grain([0.0, y], radius=RADIUS, mass=MASS)], boundaries, (0.0, -9.81), 3)
             self.assertEqual(len(record.contacts[-1]["gap"]), count, name)
             self.verify(name, "place of the disk [m]", record.position[-1, 0], [0.0, y], 1e-9)
+        # however shallow a hollow is, something holds what lies in it, beside a mesh, too; ends may be apart by rounding and more
+        for angle in (1e-7, 5e-6, 1e-4, 5e-4, 1e-3, 1.9e-3, 0.01):
+            for apart in (0.0, 1e-9 * RADIUS, 1e-4 * RADIUS):
+                ends = [[side * apart, 0.0] for side in (1, -1)]
+                sides = [{"shape": "segment", "point": end, "end": [side * 0.1, 0.1 * np.tan(0.5 * angle)]} for side, end in zip((1, -1), ends)]
+                line = f"x,y\n{-apart!r},0.0\n-0.1,{0.1 * np.tan(0.5 * angle)!r}\n"
+                for name, boundaries in (("segments", sides), ("backwards", sides[::-1]), ("a mesh", [sides[0], {"shape": "mesh", "file": "line.csv"}])):
+                    for x in (0.0, 2e-4 * RADIUS, -2e-4 * RADIUS):
+                        held = self.play(f"hollow {angle} {apart} {name} {x}", [Grain([x, RADIUS / np.cos(0.5 * angle)], radius=RADIUS, mass=MASS)],
+                                         boundaries, (0.0, -9.81), 40, files={"line.csv": line}, output={"every": 40})
+                        self.assertGreater(held.position[-1, 0, 1], 0.999 * RADIUS, f"{angle} {apart} {name} {x}")
         passes = [dict(ridge[0], material="air"), dict(ridge[1], material="stone")]
         record = self.play("left out", [Grain([0.0, RADIUS], radius=RADIUS, mass=MASS)], passes, (0.0, -9.81), 3,
                            material=[{"name": "grain"}, {"name": "air"}, {"name": "stone"}], law=[{"materials": ["grain", "air"], "kind": "none"}])

@@ -1,7 +1,7 @@
 !> Joints of walls that several boundaries make: segments that continue each other, rectangles, meshes.
 module gravier_wall_joints
   use gravier_kinds, only: dp
-  use gravier_facet, only: near_facets_t
+  use gravier_facet, only: near_facets_t, find_foot
   use gravier_facet_candidates, only: rises, has_point
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
@@ -10,9 +10,9 @@ module gravier_wall_joints
   private
   public :: is_in_joint, has_other, may_join
 
-  !> Of disks and spheres: distance below which edges of walls meet, and below which two contacts are one, in radii; sine of the
-  !> slope below which a wall is flat. The last is larger than the slope between two contacts that are one: never are both left out.
-  real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 1.0e-6_dp, flat = 4.0e-6_dp
+  !> Of disks and spheres, in radii: distance below which edges of walls meet, below which two points are one, and below which two
+  !> distances are equal; sine of the slope below which a wall is flat.
+  real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 1.0e-6_dp, equal = 1.0e-12_dp, flat = 4.0e-6_dp
 
 contains
 
@@ -51,7 +51,8 @@ contains
   end function may_join
 
   !> Whether a contact of a disk or a sphere with a segment, a rectangle or a mesh is none, because the wall goes on with another
-  !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. A mesh keeps it, else the first.
+  !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. Only a boundary that is nearer, or as
+  !> near and before it (a mesh, or the first), can take the contact away. Of all that are near at least one therefore always stays.
   logical function has_other(boundaries, filter, bodies, i, j, gap, normal)
     type(boundary_t), intent(in) :: boundaries(:)
     !> which pairs do not meet
@@ -62,31 +63,55 @@ contains
     !> [m], (nd) unit vector towards the body
     real(dp), intent(in) :: gap, normal(:)
     real(dp) :: point(size(normal)), corners(3, 4), towards(3), radius
-    logical :: has_it, rises_there, is_faceted
+    logical :: has_it, rises_there
     integer :: k, n
 
     has_other = .false.
-    is_faceted = boundaries(j)%is_faceted()
-    if (.not. (is_faceted .or. boundaries(j)%has_corners())) return
+    if (.not. (boundaries(j)%is_faceted() .or. boundaries(j)%has_corners())) return
     radius = bodies%radius(i)
     point(:) = bodies%position(:, i) - (gap + radius)*normal
-    if (.not. is_faceted) then
+    if (.not. boundaries(j)%is_faceted()) then
       call boundaries(j)%find_corners(point, n, corners)
-      if (.not. is_on_rim(corners(:, 1:n), one_edge*radius)) return
+      if (.not. is_on_rim(corners(:, 1:n), one_place*radius)) return
     end if
     towards(:) = 0.0_dp
     towards(1:size(normal)) = normal
     do k = 1, size(boundaries)
       if (k == j .or. .not. boundaries(k)%touches()) cycle
       if (filter%lets_pass(bodies, boundaries, i, -k)) cycle
-      call meet_at(boundaries(k), point, towards, one_edge*radius, flat, has_it, has_other)
-      if (has_other) return
-      if (.not. has_it .or. (is_faceted .and. .not. boundaries(k)%is_faceted())) cycle
-      if (k > j .and. (is_faceted .or. .not. boundaries(k)%is_faceted())) cycle
-      call meet_at(boundaries(k), point, towards, one_place*radius, flat, has_other, rises_there)
+      call meet_at(boundaries(k), point, towards, one_edge*radius, flat, has_it, rises_there)
+      if (has_it .and. .not. rises_there) call meet_at(boundaries(k), point, towards, one_place*radius, flat, has_it, rises_there)
+      if (.not. has_it) cycle
+      has_other = comes_before(boundaries, k, j, bodies%position(:, i), gap + radius, equal*radius)
       if (has_other) return
     end do
   end function has_other
+
+  !> Whether boundary `k` is nearer to a point than boundary `j`, or as near and before it.
+  logical function comes_before(boundaries, k, j, centre, distance, tolerance)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: k, j
+    !> (nd), distance of `j`, difference below which distances are equal [m]
+    real(dp), intent(in) :: centre(:), distance, tolerance
+    type(near_facets_t) :: near
+    real(dp) :: found, normal(size(centre)), foot(3)
+    integer :: f, where_foot_is
+
+    if (boundaries(k)%is_faceted()) then
+      found = huge(1.0_dp)
+      call boundaries(k)%find_facets(centre, abs(distance) + 2.0_dp*tolerance, near)
+      do f = 1, near%n
+        call find_foot(near%corner(:, :, f), foot, where_foot_is)
+        found = min(found, norm2(foot))
+      end do
+    else
+      call boundaries(k)%locate(centre, found, normal)
+    end if
+    comes_before = found < distance - tolerance
+    if (abs(found - distance) > tolerance) return
+    comes_before = k < j
+    if (boundaries(k)%is_faceted() .neqv. boundaries(j)%is_faceted()) comes_before = boundaries(k)%is_faceted()
+  end function comes_before
 
   !> Whether the origin lies on the rim of a segment or a rectangle with these corners, in order around it.
   pure logical function is_on_rim(corners, tolerance)
