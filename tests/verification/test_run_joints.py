@@ -85,8 +85,8 @@ class Joints(SmallScene):
             self.assertEqual(len(record.contacts[-1]["gap"]), count, name)
             self.verify(name, "place of the disk [m]", record.position[-1, 0], [0.0, y], 1e-9)
         # however shallow a hollow is, something holds what lies in it, beside a mesh, too; ends may be apart by rounding and more
-        for angle in (1e-7, 5e-6, 1e-4, 5e-4, 1e-3, 1.9e-3, 0.01):
-            for apart in (0.0, 1e-9 * RADIUS, 1e-4 * RADIUS):
+        for angle in (1e-7, 5e-6, 5e-4, 1.9e-3, 0.01):
+            for apart in (0.0, 1e-4 * RADIUS):
                 ends = [[side * apart, 0.0] for side in (1, -1)]
                 sides = [{"shape": "segment", "point": end, "end": [side * 0.1, 0.1 * np.tan(0.5 * angle)]} for side, end in zip((1, -1), ends)]
                 line = f"x,y\n{-apart!r},0.0\n-0.1,{0.1 * np.tan(0.5 * angle)!r}\n"

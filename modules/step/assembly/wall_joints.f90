@@ -51,8 +51,8 @@ contains
   end function may_join
 
   !> Whether a contact of a disk or a sphere with a segment, a rectangle or a mesh is none, because the wall goes on with another
-  !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. Only a boundary that is nearer, or as
-  !> near and before it (a mesh, or the first), can take the contact away. Of all that are near at least one therefore always stays.
+  !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. Only a boundary that is nearer,
+  !> or as near and before it (a mesh, or the first), takes the contact away. Of all that are near one therefore always stays.
   logical function has_other(boundaries, filter, bodies, i, j, gap, normal)
     type(boundary_t), intent(in) :: boundaries(:)
     !> which pairs do not meet
