@@ -403,7 +403,8 @@ contains
 
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
     call self%tally%add_step(figures%max_overlap, figures%interface_statistics, shifts/self%overlap_allowed > rounded_shift, &
-      & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains, self%physics%h)
+      & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains)
+    call self%tally%add_ways(self%physics%h, self%balance%momentum, self%mass, self%decomposition%boundaries)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic

@@ -81,26 +81,28 @@ contains
     text = text//newline
   end function scale_range_line
 
-  !> Whether grains have moved visibly in steps whose motion is not told from the errors of their solves.
+  !> Whether the scene has moved visibly, as a whole, in steps whose motion is not told from the errors of their solves.
   pure logical function drifts(simulation)
     type(simulation_t), intent(in) :: simulation
-    drifts = simulation%tally%drift > most_drift*simulation%velocity_scale%diameter
+    drifts = simulation%tally%drift() > most_drift*simulation%velocity_scale%diameter
   end function drifts
 
-  !> How far grains have moved in steps whose motion is not told from the errors of their solves, where that can be seen, and what
-  !> resolves it. Errors are about proportional to the goal: half of the goal which would keep the way below a bound does so.
+  !> How far the centre of mass, or a boundary that forces move, has come in steps whose motion is not told from the errors of their
+  !> solves, where that can be seen, and what resolves it. Errors are about proportional to the goal: half of the goal which would
+  !> keep the way below a bound does so.
   function drift_lines(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
+    real(dp) :: way
 
     text = ""
     if (.not. drifts(simulation)) return
-    associate (tally => simulation%tally, d => simulation%velocity_scale%diameter)
+    associate (tally => simulation%tally)
+      way = tally%drift()/simulation%velocity_scale%diameter
       text = "drift       in "//to_text(tally%unresolved)//" of "//counted(tally%steps, "step")// &
-        & " bodies moved no faster than twice the velocity error of the solve, by "//plain(tally%drift/d)// &
-        & " mean diameters in all"//newline//indent//"that motion may be nothing but errors; the "// &
-        & goal_text(simulation, 0.5_dp*most_drift*d/tally%drift)//" would keep them below "//plain(most_drift)// &
-        & " mean diameters"//newline
+        & " bodies moved no faster than twice the velocity error of the solve, and came "//plain(way)// &
+        & " mean diameters away as a whole"//newline//indent//"that motion may be nothing but errors; the "// &
+        & goal_text(simulation, 0.5_dp*most_drift/way)//" would keep them below "//plain(most_drift)//" mean diameters"//newline
     end associate
   end function drift_lines
 

@@ -195,8 +195,8 @@ contains
       if (tally%later_overlap > deep*simulation%mean_half_thickness .and. simulation%mean_half_thickness > 0.0_dp) text = text// &
         & "; overlaps came to "//plain(tally%later_overlap/simulation%mean_half_thickness)//" of "//mean_size_name(simulation)
       if (drifts(simulation)) text = text//"; in "//to_text(tally%unresolved)//" of "//steps// &
-        & " bodies moved by no more than the errors of solves, "//plain(tally%drift/simulation%velocity_scale%diameter)// &
-        & " mean diameters in all: see `drift`"
+        & " bodies moved by no more than the errors of solves, and came "// &
+        & plain(tally%drift()/simulation%velocity_scale%diameter)//" mean diameters away: see `drift`"
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate

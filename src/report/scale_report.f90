@@ -26,6 +26,8 @@ module gravier_scale_report
   real(dp), parameter :: most_relative_step = 0.1_dp
   !> fraction of the speed of a wall that errors may have in slow shear
   real(dp), parameter :: error_share = 0.05_dp
+  !> part of the period of an oscillation that a step may take
+  real(dp), parameter :: most_of_period = 0.1_dp
   !> part of the ups and downs of a table that steps should keep
   real(dp), parameter :: least_kept = 0.9_dp
 
@@ -118,6 +120,7 @@ contains
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       call warn(cell_warning(simulation, d))
       call warn(table_warning(simulation))
+      call warn(oscillation_warning(simulation))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
@@ -214,6 +217,25 @@ contains
     end subroutine look
 
   end function table_warning
+
+  !> That steps do not follow an oscillation, the fastest one; else empty.
+  function oscillation_warning(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    real(dp) :: most
+    integer :: b
+
+    text = ""
+    most = most_of_period
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(b))
+        if (.not. boundary%drive%frequency*simulation%config%time%step > most) cycle
+        most = boundary%drive%frequency*simulation%config%time%step
+        text = "boundary '"//boundary%name//"': a period of its oscillation has "//figure(1.0_dp/most)// &
+          & " steps; a &time step of at most "//figure(most_of_period/boundary%drive%frequency)//" s follows it"
+      end associate
+    end do
+  end function oscillation_warning
 
   !> That the way of grains in a step is too long.
   function fast_warning(simulation, fast, step) result(text)

@@ -121,7 +121,7 @@ contains
     do b = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(b))
         rests = rests .and. .not. (boundary%remove_at > since .and. boundary%remove_at < huge(1.0_dp))
-        rests = rests .and. .not. boundary%drive%changes_after(since)
+        if (boundary%present) rests = rests .and. .not. boundary%drive%changes_after(since)
       end associate
     end do
   end function rests

@@ -209,7 +209,7 @@ class Report(RunTestCase):
     def test_drift(self):
         """Motion below the errors of solves casts doubt on an accuracy that was reached."""
         history = gravier.results.Table(step=np.arange(1, 5), velocity_error=np.full(4, 1e-4), velocity_scale=np.full(4, 1e-2), converged=np.ones(4))
-        said = "in 4 of 4 steps bodies moved no faster than twice the velocity error of the solve, by 0.42 mean diameters in all"
+        said = "in 4 of 4 steps bodies moved no faster than twice the velocity error of the solve, and came 0.42 mean diameters away as a whole"
         for text, grade in (("", "good"), (f"drift       {said}\n            that motion may be nothing but errors\n", "doubt")):
             answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n" + text), history, {})
             self.assertEqual(answer.grade, grade, answer.text)

@@ -250,7 +250,7 @@ class Insertion(RunTestCase):
         feed = {"name": "feed", "lower": [0.0, 0.0], "upper": [0.1, 0.06], "radius": 0.01, "rate": 10.0}
         bin_ = [BIN[0], BIN[1], {**BIN[2], "point": [0.1, 0.0]}]
         case = {"scene": {"dimension": 2, "bodies": "none", "friction": 0.3}, "boundary": bin_, "time": {"step": H, "steps": 2500, "rest_energy": 1e-3},
-                "output": {"every": 0}}
+                "output": {"every": 0, "energy": True}}
         run = run_case(merged(case, {"insertion": [{**feed, "count": 14}]}), directory=self.here("rested"))
         self.assert_status(run, 0)
         self.assertRegex(run.stdout, r"insertion   'feed': 14 grains of \S+ kg entered, all that its bounds allow; grains were put off in \d+ steps\n")
@@ -258,7 +258,7 @@ class Insertion(RunTestCase):
         full = run_case(merged(case, {"insertion": [{**feed, "rate": 200.0, "count": 50}]}), directory=self.here("full"))
         self.assert_status(full, 0)
         self.assertRegex(full.stdout, r"at rest     after step \d+ of 2500: .* J in 10 steps, and grains that are still to enter found no place\n")
-        entered, energy = (np.array(full.history()[name]) for name in ("entered", "kinetic_energy"))
+        entered, energy = (np.array(full.history()[name]) for name in ("entered", "kinetic_translation"))
         self.assertTrue((energy[-10:] <= 1e-3).all() and not entered[-10:].any())
 
     def test_start_and_end(self):

@@ -30,8 +30,10 @@ module gravier_grain_balance
     real(dp) :: moving = 0.0_dp
     !> sum of their speeds now [m/s]
     real(dp) :: speeds = 0.0_dp
-    !> sums of m v [kg m/s] and, with a body force, of V v [m^4/s] now
-    real(dp), private :: momentum(3) = 0.0_dp, flux(3) = 0.0_dp
+    !> sum of m v now [kg m/s]
+    real(dp) :: momentum(3) = 0.0_dp
+    !> with a body force, sum of V v now [m^4/s]
+    real(dp), private :: flux(3) = 0.0_dp
   contains
     procedure :: begin => grain_balance_begin
     procedure :: take_step => grain_balance_take_step

@@ -4,6 +4,7 @@
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_creeping_groups, only: creep_t
+  use gravier_boundary, only: boundary_t
   use gravier_interface, only: interface_statistics_t
   use gravier_solve_report, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, &
     & solve_unbounded
@@ -17,7 +18,7 @@ module gravier_run_tally
   real(dp), parameter :: often_mended = 0.1_dp
   !> errors of its solve below which the motion of a step is not told from them
   real(dp), parameter :: unresolved_times = 2.0_dp
-  !> diameters by which grains may move in the steps whose motion is not told from the errors of their solves
+  !> diameters by which a scene may move as a whole in the steps whose motion is not told from the errors of their solves
   real(dp), parameter :: most_drift = 0.01_dp
   !> times the overlap of the first step, or the overlap that is allowed, from which on overlaps have grown
   real(dp), parameter :: grown = 2.0_dp
@@ -34,9 +35,11 @@ module gravier_run_tally
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
-    !> steps whose motion is not told from the errors of their solves, and the path of the free grains in these, a mean [m]
+    !> steps whose motion is not told from the errors of their solves, and the way of the centre of mass of the free grains and of each
+    !> boundary that forces move in these (3), (3, boundaries) [m]
     integer(i8) :: unresolved = 0
-    real(dp) :: drift = 0.0_dp
+    real(dp) :: way(3) = 0.0_dp
+    real(dp), allocatable :: way_of_boundary(:, :)
     !> largest overlap of the first step, which is that of the start, and of all later steps [m]
     real(dp) :: start_overlap = 0.0_dp, later_overlap = 0.0_dp
     !> of compliant contacts: largest deformation [m], largest product of the step and the frequency of a normal spring
@@ -66,6 +69,8 @@ module gravier_run_tally
   contains
     procedure :: add_solve => run_tally_add_solve
     procedure :: add_step => run_tally_add_step
+    procedure :: add_ways => run_tally_add_ways
+    procedure :: drift => run_tally_drift
     procedure :: missed => run_tally_missed
     procedure :: mended_share => run_tally_mended_share
     procedure :: overlaps_grew => run_tally_overlaps_grew
@@ -140,7 +145,7 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path, h)
+  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
@@ -150,8 +155,6 @@ contains
     logical, intent(in) :: mended
     !> means over the free grains [m]
     real(dp), intent(in) :: shift, path
-    !> length of the step, whose solve has been added [s]
-    real(dp), intent(in) :: h
 
     self%steps = self%steps + 1
     if (self%steps == 1) then
@@ -168,11 +171,58 @@ contains
     self%most_stretched = max(self%most_stretched, statistics%stretched_bonds)
     self%shift = self%shift + shift
     self%path = self%path + path
-    if (path > 0.0_dp .and. self%own_velocity < unresolved_times*self%velocity_error) then
-      self%unresolved = self%unresolved + 1
-      self%drift = self%drift + min(path, h*self%velocity_error)
-    end if
   end subroutine run_tally_add_step
+
+  !> Add the ways of a step whose motion is not told from the error of its solve, which has been added. Steps without an error, or in
+  !> which bodies moved faster before, are none.
+  pure subroutine run_tally_add_ways(self, h, momentum, mass, boundaries)
+    class(run_tally_t), intent(inout) :: self
+    !> [s]; of the free grains [kg m/s], [kg]
+    real(dp), intent(in) :: h, momentum(3), mass
+    !> with the velocities of the end of the step
+    type(boundary_t), intent(in) :: boundaries(:)
+    real(dp) :: velocity(3), most
+    integer :: b
+
+    if (.not. self%own_velocity < unresolved_times*self%velocity_error) return
+    self%unresolved = self%unresolved + 1
+    most = unresolved_times*self%velocity_error
+    if (mass > 0.0_dp) then
+      velocity(:) = momentum/mass
+      call add_way(velocity, h, most, self%way)
+    end if
+    if (.not. allocated(self%way_of_boundary)) allocate (self%way_of_boundary(3, size(boundaries)), source=0.0_dp)
+    do b = 1, size(boundaries)
+      velocity(:) = merge(boundaries(b)%velocity, 0.0_dp, boundaries(b)%free)
+      call add_way(velocity, h, most, self%way_of_boundary(:, b))
+    end do
+  end subroutine run_tally_add_ways
+
+  !> Add the way of a step at a velocity, of which no more counts than the errors may be: what is faster, such as grains in the air, is
+  !> not one of the bodies in contact.
+  pure subroutine add_way(velocity, h, most, way)
+    !> [m/s], [s], [m/s]
+    real(dp), intent(in) :: velocity(3), h, most
+    !> [m]
+    real(dp), intent(inout) :: way(3)
+    real(dp) :: share
+
+    share = 1.0_dp
+    if (norm2(velocity) > most) share = most/norm2(velocity)
+    way(:) = way + share*h*velocity
+  end subroutine add_way
+
+  !> The longest of these ways [m].
+  pure real(dp) function run_tally_drift(self) result(drift)
+    class(run_tally_t), intent(in) :: self
+    integer :: b
+
+    drift = norm2(self%way)
+    if (.not. allocated(self%way_of_boundary)) return
+    do b = 1, size(self%way_of_boundary, 2)
+      drift = max(drift, norm2(self%way_of_boundary(:, b)))
+    end do
+  end function run_tally_drift
 
   !> Solves that missed their criterion.
   pure integer(i8) function run_tally_missed(self) result(missed)
