@@ -122,6 +122,8 @@ contains
         & ": forces move it; expected 0 there", error)
       if (boundary%drive%gives(drives_velocity, d)) call refuse(boundary, "velocity", "along "//axes(d)// &
         & ": its table gives it; expected a boundary without this column", error)
+      if (abs(boundary%drive%oscillation(d)) > 0.0_dp) call refuse(boundary, "velocity", "along "//axes(d)// &
+        & ": it oscillates; expected a boundary without an oscillation along this axis", error)
     end do
     if (.not. allocated(error)) boundary%drive%velocity(1:size(values)) = values
   end subroutine set_velocity
@@ -139,6 +141,8 @@ contains
       k = 3 - size(values) + d
       if (boundary%drive%gives(drives_spin, k)) call refuse(boundary, "spin", "about "//axes(k)// &
         & ": its table gives it; expected a boundary without this column", error)
+      if (abs(boundary%drive%rotation_oscillation(k)) > 0.0_dp) call refuse(boundary, "spin", "about "//axes(k)// &
+        & ": it oscillates; expected a boundary without an oscillation about this axis", error)
       if (abs(values(d)) > 0.0_dp .and. .not. turns(d)) call refuse(boundary, "spin", "about "//axes(k)// &
         & ": the boundary does not turn about it in the case; expected 0, or a rotation in the case", error)
     end do

@@ -44,8 +44,8 @@ contains
 
     why = ""
     if (rests(simulation)) then
-      why = "the kinetic energy of the grains was at most "//to_text(simulation%rest_energy, 3)//" J in "// &
-        & to_text(steps_at_rest)//" steps"
+      why = "the kinetic energy of the grains, without spins of disks and spheres, was at most "// &
+        & to_text(simulation%rest_energy, 3)//" J in "//to_text(steps_at_rest)//" steps"
       if (simulation%inflow%is_blocked(simulation%time)) why = why//", and grains that are still to enter found no place"
       do b = 1, size(simulation%decomposition%boundaries)
         if (still_moves(simulation, b)) why = why//"; boundary '"//simulation%decomposition%boundaries(b)%name//"' still moves"

@@ -878,7 +878,7 @@ class Import(RunTestCase):
         disk = body(2, 1, [0.0, 0.05], [("DISKx", "BLUEx", values(byrd=0.05))])
         wall = body(2, 2, [0.0, -0.01], [("JONCx", "WALLx", values(axe1=0.2, axe2=0.01))])
         laws = LAW + SEE.format("RBDY2", "DISKx", "BLUEx", "JONCx", "WALLx")
-        moved = drive(2, 2, [("vlocy", k, 0.0, 0.1 * (k == 1), 9.0, 0.0, 1.0, 0.0) for k in (1, 2, 3)])
+        moved = drive(2, 2, [("vlocy", k, 0.0, 0.1 * (k == 1), 9.0, 0.0, 0.5, 1.0) for k in (1, 2, 3)])
         contacts = "$icdan  DKJCx        1\n cdbdy  numbr\n RBDY2      1  DISKx      1  iqsc0  RBDY2      2  JONCx      1  noctc\n" + " " * 29 + \
             values(n1=0.0, n2=1.0) + "\n" + " " * 29 + f"gapTT {real(0.0)}  rln/H {real(0.0)}  rlt/H {real(0.0)}\n"
         box = self.box(2, disk + wall, laws, moved, contacts=contacts)

@@ -104,7 +104,7 @@ class AtRest(RunTestCase):
                             "boundary": [{"shape": "plane", "normal": [0.0, 1.0]}, wall],
                             "time": {"step": 1e-3, "steps": 100, "rest_energy": LOW}, "output": {"every": 0}}, directory=place)
             self.assert_status(run, 0)
-            self.assertIn("at rest     after step 10 of 100: the kinetic energy of the grains was at most", run.stdout)
+            self.assertIn("at rest     after step 10 of 100: the kinetic energy of the grains, without spins of disks and spheres, was at most", run.stdout)
             self.assertEqual("; boundary 'lid' still moves" in run.stdout, told, run.stdout[-600:])
 
     def test_a_ball_at_its_apex_is_not_at_rest(self):

@@ -254,7 +254,7 @@ class Insertion(RunTestCase):
         run = run_case(merged(case, {"insertion": [{**feed, "count": 14}]}), directory=self.here("rested"))
         self.assert_status(run, 0)
         self.assertRegex(run.stdout, r"insertion   'feed': 14 grains of \S+ kg entered, all that its bounds allow; grains were put off in \d+ steps\n")
-        self.assertRegex(run.stdout, r"at rest     after step \d+ of 2500: the kinetic energy of the grains was at most 1.00E-03 J in 10 steps\n")
+        self.assertRegex(run.stdout, r"at rest     after step \d+ of 2500: the kinetic energy of the grains, without spins of disks and spheres, was at most 1.00E-03 J in 10 steps\n")
         full = run_case(merged(case, {"insertion": [{**feed, "rate": 200.0, "count": 50}]}), directory=self.here("full"))
         self.assert_status(full, 0)
         self.assertRegex(full.stdout, r"at rest     after step \d+ of 2500: .* J in 10 steps, and grains that are still to enter found no place\n")

@@ -57,7 +57,7 @@ class Joints(SmallScene):
             kinds = {"adhesive": {"adhesion": PULL, "adhesion_range": 5e-4}, "bonded": {"bond_strength": PULL, "bond_friction": 1.0, "bond_distance": 1e-4},
                      "capillary": {"capillarity": PULL / RADIUS, "decay_length": 1e-3, "debonding_distance": 5e-4}}
             for kind, keys in kinds.items():
-                for x in (-0.05, 0.0, 5e-6, 5e-4, 2e-3):
+                for x in (-0.05, 0.0, 1.2e-8, -1.7e-8, 3e-8, 5e-6, 2e-3):
                     for share in (0.95, 1.05):
                         up = share * PULL / MASS * np.eye(dimension)[-1]
                         record = self.play(f"{kind} {dimension} {x} {share}", [Grain(place(dimension, x, RADIUS), radius=RADIUS, mass=MASS)],
@@ -65,7 +65,7 @@ class Joints(SmallScene):
                                            law=[{"materials": ["a"], "kind": kind, **keys}], output={"every": 60})
                         way = record.position[-1, 0] - record.position[0, 0]
                         case = f"{kind}, {dimension}D, {x} m from a joint, pulled with {share} of its strength"
-                        self.assertLess(abs(way[0]), 1e-8, case)
+                        self.assertLess(abs(way[0]), 2e-7, case)
                         if share < 1.0:
                             self.assertLess(way[-1], 1e-8, case)
                         else:

@@ -54,6 +54,9 @@ REFUSED = [
     ("s.boundaries['floor'].pressure = 1.0", "boundary 'floor': pressure is for a plane of which a component along its normal is free"),
     ("s.boundaries['lid'].velocity = (0.0, 1.0)", "boundary 'lid': velocity along y: forces move it; expected 0 there"),
     ("s.boundaries['belt'].velocity = (1.0, 0.0)", "boundary 'belt': velocity along x: its table gives it; expected a boundary without this column"),
+    ("s.boundaries['swing'].velocity = (1.0, 0.0)", "boundary 'swing': velocity along y: it oscillates; expected a boundary without an oscillation along "
+     "this axis"),
+    ("s.boundaries['swing'].spin = 1.0", "boundary 'swing': spin about z: it oscillates; expected a boundary without an oscillation about this axis"),
     ("s.boundaries['belt'].spin = 1.0", "boundary 'belt': spin about z: its table gives it; expected a boundary without this column"),
     ("s.boundaries['press'].applied_force = (0.0, 1.0)",
      "boundary 'press': applied_force along y: its table gives it; expected a boundary without this column"),
@@ -95,7 +98,9 @@ ENDED = "MPI has been ended in this process; expected one in which it runs or ca
 BOUNDARIES = [{"name": "lid", "shape": "plane", "point": [0.0, 2.0], "normal": [0.0, -1.0], "free": [False, True], "mass": 1.0},
               {"name": "press", "shape": "plane", "point": [0.0, 3.0], "normal": [0.0, -1.0], "free": [False, True], "mass": 1.0,
                "table": "press.csv"},
-              {"name": "belt", "shape": "segment", "point": [4.0, 0.0], "end": [5.0, 0.0], "table": "belt.csv"}]
+              {"name": "belt", "shape": "segment", "point": [4.0, 0.0], "end": [5.0, 0.0], "table": "belt.csv"},
+              {"name": "swing", "shape": "segment", "point": [6.0, 0.0], "end": [7.0, 0.0], "oscillation": [0.0, 0.1], "rotation_oscillation": [0.1],
+               "frequency": 5.0}]
 
 
 class Refusals(LoopTestCase):

@@ -32,8 +32,7 @@ module gravier_boundary_drive
     logical :: steered = .false.
   contains
     procedure :: velocity_at => boundary_drive_velocity_at
-    procedure :: velocity_beside => boundary_drive_velocity_beside
-    procedure :: spin_beside => boundary_drive_spin_beside
+    procedure :: time_beside => boundary_drive_time_beside
     procedure :: spin_at => boundary_drive_spin_at
     procedure :: force_at => boundary_drive_force_at
     procedure :: pressure_at => boundary_drive_pressure_at
@@ -129,47 +128,15 @@ contains
     if (abs(self%rotation_oscillation(k)) > 0.0_dp) spin = spin + self%rotation_oscillation(k)*rate_of_sine(self, time)
   end function boundary_drive_spin_at
 
-  !> Prescribed velocity along axis `d` beside a time: in the row of the table before it or after it, and of the oscillation a
-  !> quarter of a period before or after it. One of the three times, the given one among them, is near the largest velocity of a
-  !> drive that starts or turns round [m/s].
-  pure real(dp) function boundary_drive_velocity_beside(self, d, time, side) result(velocity)
+  !> A time beside another one, by some duration or by a quarter of the period of an oscillation, if that is shorter [s].
+  pure real(dp) function boundary_drive_time_beside(self, time, duration) result(beside)
     class(boundary_drive_t), intent(in) :: self
-    integer, intent(in) :: d
-    !> [s]
-    real(dp), intent(in) :: time
-    !> -1: before, 1: after
-    integer, intent(in) :: side
-    integer :: column
+    !> [s]; the duration is negative towards the past
+    real(dp), intent(in) :: time, duration
 
-    velocity = self%velocity(d)
-    column = column_of(self, drives_velocity, d)
-    if (column > 0) velocity = self%table%beside(column, time, side)
-    if (abs(self%oscillation(d)) > 0.0_dp) velocity = velocity + self%oscillation(d)*rate_of_sine(self, time + quarter(self, side))
-  end function boundary_drive_velocity_beside
-
-  !> The same of the rate of rotation about axis `k` [rad/s].
-  pure real(dp) function boundary_drive_spin_beside(self, k, time, side) result(spin)
-    class(boundary_drive_t), intent(in) :: self
-    integer, intent(in) :: k
-    !> [s]
-    real(dp), intent(in) :: time
-    !> -1: before, 1: after
-    integer, intent(in) :: side
-    integer :: column
-
-    spin = self%spin(k)
-    column = column_of(self, drives_spin, k)
-    if (column > 0) spin = self%table%beside(column, time, side)
-    if (abs(self%rotation_oscillation(k)) > 0.0_dp) spin = spin + &
-      & self%rotation_oscillation(k)*rate_of_sine(self, time + quarter(self, side))
-  end function boundary_drive_spin_beside
-
-  !> A quarter of a period, with a sign [s]; there is an oscillation.
-  pure real(dp) function quarter(self, side)
-    type(boundary_drive_t), intent(in) :: self
-    integer, intent(in) :: side
-    quarter = 0.25_dp*side/self%frequency
-  end function quarter
+    beside = time + duration
+    if (self%oscillates()) beside = time + sign(min(abs(duration), 0.25_dp/self%frequency), duration)
+  end function boundary_drive_time_beside
 
   !> Force of the user along axis `d` at a time [N].
   pure real(dp) function boundary_drive_force_at(self, d, time) result(force)

@@ -23,7 +23,6 @@ module gravier_time_table
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
-    procedure :: beside => time_table_beside
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
     procedure :: digest => time_table_digest
@@ -182,21 +181,6 @@ contains
     if (high > low) value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
   end function time_table_at
 
-  !> Value of column `k` in the row before a time, or in the row after it.
-  pure real(dp) function time_table_beside(self, k, time, side) result(value)
-    class(time_table_t), intent(in) :: self
-    integer, intent(in) :: k
-    !> [s]
-    real(dp), intent(in) :: time
-    !> -1: before, 1: after
-    integer, intent(in) :: side
-    integer :: low, high
-    real(dp) :: share
-
-    call find_rows(self, time, low, high, share)
-    value = self%value(k, merge(low, high, side < 0))
-  end function time_table_beside
-
   !> The rows between which a time lies, twice the same row outside of the table, and how far it is from the first to the second.
   pure subroutine find_rows(self, time, low, high, share)
     type(time_table_t), intent(in) :: self
@@ -212,7 +196,7 @@ contains
     high = size(self%time)
     share = 0.0_dp
     at = time
-    if (self%period > 0.0_dp) at = self%time(low) + modulo(time - self%time(low), self%period)
+    if (self%period > 0.0_dp .and. time > self%time(high)) at = self%time(low) + modulo(time - self%time(low), self%period)
     if (at <= self%time(low)) high = low
     if (at >= self%time(size(self%time))) low = high
     if (high == low) return

@@ -23,7 +23,7 @@ module gravier_moving_cell
     logical :: driven(3, 3) = .false.
     !> velocity gradient at the start of the step, at its end without contacts, and at its end [1/s]
     real(dp) :: before(3, 3) = 0.0_dp, free(3, 3) = 0.0_dp, now(3, 3) = 0.0_dp
-    !> norm of the rates that are given, the larger one of the rows of their table beside the step; 0 without a table [1/s]
+    !> norm of the rates that a table gives, the larger one of some steps before and after the step; 0 without a table [1/s]
     real(dp) :: fastest = 0.0_dp
     !> of the components that stresses drive [kg m^2]
     real(dp) :: inertia(3, 3) = 1.0_dp

@@ -7,7 +7,7 @@ module gravier_narrow_phase
   use gravier_decomposition, only: decomposition_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
-  use gravier_wall_joints, only: has_other, may_join
+  use gravier_wall_joints, only: joints_t, has_other
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
@@ -80,11 +80,11 @@ contains
     type(shape_work_t) :: work
     integer :: w, p, i, j, c, nd
     real(dp) :: branch(decomposition%nd), distance, gap, alert
-    logical :: walls_join
+    type(joints_t) :: joints
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
-    walls_join = may_join(decomposition%boundaries)
+    call joints%find(decomposition%boundaries)
     call work%init(nd, physics%h, counts=.false.)
     do w = 1, view%list%n_watched()
       p = view%list%watched_place(w)
@@ -108,14 +108,14 @@ contains
       else
         if (.not. decomposition%boundaries(-j)%present) cycle
         if (decomposition%boundaries(-j)%is_faceted()) then
-          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, walls_join, work, found)
+          if (view%list%begins(p)) call find_facet_contacts(view, decomposition, physics, p, joints, work, found)
           cycle
         end if
         call decomposition%boundaries(-j)%locate(view%bodies%position(:, i), distance, found%normal(:, c))
         gap = distance - view%bodies%radius(i)
         if (is_far(view%list, p, gap, alert)) cycle
-        if (walls_join .and. .not. remembers(view%list, p)) then
-          if (has_other(decomposition%boundaries, decomposition%rule%filter, view%bodies, i, -j, gap, found%normal(:, c))) cycle
+        if (joints%exist .and. .not. remembers(view%list, p)) then
+          if (has_other(decomposition, joints, view%bodies, i, -j, gap, found%normal(:, c))) cycle
         end if
       end if
       found%source(c) = p
@@ -125,13 +125,13 @@ contains
   end subroutine find_round_contacts
 
   !> The contacts of a disk or a sphere with a boundary of facets, whose pair begins at place `p`.
-  subroutine find_facet_contacts(view, decomposition, physics, p, walls_join, work, found)
+  subroutine find_facet_contacts(view, decomposition, physics, p, joints, work, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     integer, intent(in) :: p
-    !> other boundaries may make one wall with this one
-    logical, intent(in) :: walls_join
+    !> of the boundaries
+    type(joints_t), intent(in) :: joints
     type(shape_work_t), intent(inout) :: work
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
@@ -141,10 +141,10 @@ contains
     call carry_memory(points, p, view%list)
     do k = 1, points%n
       call write_point(points, k, p, found)
-      if (walls_join .and. .not. remembers(view%list, p + k - 1)) then
+      if (joints%exist .and. .not. remembers(view%list, p + k - 1)) then
         associate (c => found%n + 1)
-          if (has_other(decomposition%boundaries, decomposition%rule%filter, view%bodies, view%list%candidate(p), &
-            & -view%list%antagonist(p), found%gap(c), found%normal(:, c))) cycle
+          if (has_other(decomposition, joints, view%bodies, view%list%candidate(p), -view%list%antagonist(p), found%gap(c), &
+            & found%normal(:, c))) cycle
         end associate
       end if
       call add_contact(view, decomposition, physics, found)

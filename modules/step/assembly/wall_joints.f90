@@ -5,14 +5,28 @@ module gravier_wall_joints
   use gravier_facet_candidates, only: rises, has_point
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
-  use gravier_material_filter, only: material_filter_t
+  use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: is_in_joint, has_other, may_join
+  public :: is_in_joint, has_other, joints_t
 
   !> Of disks and spheres, in radii: distance below which edges of walls meet, below which two points are one, and below which two
-  !> distances are equal; sine of the slope below which a wall is flat.
-  real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 1.0e-6_dp, equal = 1.0e-12_dp, flat = 4.0e-6_dp
+  !> distances are equal; sine of the slope below which a wall is flat. Beside a flush joint distances are equal up to sqrt(2 equal),
+  !> which is less than one_place.
+  real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 2.0e-6_dp, equal = 1.0e-12_dp, flat = 1.0e-10_dp
+
+  !> reach of what may be anywhere; its square is a number [m]
+  real(dp), parameter :: anywhere = 1.0e150_dp
+
+  !> Which boundaries may make one wall, and a sphere around each, so that most are left out at once.
+  type :: joints_t
+    !> there are several of them
+    logical :: exist = .false.
+    !> (3, boundaries), (boundaries): below 0 of a boundary that joins nothing, without end in scenes with a period [m]
+    real(dp), allocatable :: middle(:, :), reach(:)
+  contains
+    procedure :: find => joints_find
+  end type joints_t
 
 contains
 
@@ -37,26 +51,38 @@ contains
     end do
   end function is_in_joint
 
-  !> Whether several boundaries may make one wall: segments, rectangles and meshes.
-  pure logical function may_join(boundaries)
+  !> Find the segments, rectangles and meshes that are there, where they are now.
+  subroutine joints_find(self, boundaries)
+    class(joints_t), intent(inout) :: self
     type(boundary_t), intent(in) :: boundaries(:)
-    integer :: b, n
+    real(dp) :: corner(3, 8)
+    integer :: b, k, n
 
-    n = 0
+    if (allocated(self%reach)) deallocate (self%middle, self%reach)
+    allocate (self%middle(3, size(boundaries)), source=0.0_dp)
+    allocate (self%reach(size(boundaries)), source=-1.0_dp)
     do b = 1, size(boundaries)
       if (.not. boundaries(b)%touches()) cycle
-      if (boundaries(b)%has_corners() .or. boundaries(b)%is_faceted()) n = n + 1
+      if (.not. (boundaries(b)%has_corners() .or. boundaries(b)%is_faceted())) cycle
+      self%reach(b) = anywhere
+      if (any(boundaries(b)%period > 0.0_dp)) cycle
+      call boundaries(b)%surface%find_box(n, corner)
+      self%middle(:, b) = sum(corner(:, 1:n), dim=2)/n
+      self%reach(b) = 0.0_dp
+      do k = 1, n
+        self%reach(b) = max(self%reach(b), norm2(corner(:, k) - self%middle(:, b)))
+      end do
     end do
-    may_join = n > 1
-  end function may_join
+    self%exist = count(self%reach >= 0.0_dp) > 1
+  end subroutine joints_find
 
   !> Whether a contact of a disk or a sphere with a segment, a rectangle or a mesh is none, because the wall goes on with another
   !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. Only a boundary that is nearer,
   !> or as near and before it (a mesh, or the first), takes the contact away. Of all that are near one therefore always stays.
-  logical function has_other(boundaries, filter, bodies, i, j, gap, normal)
-    type(boundary_t), intent(in) :: boundaries(:)
-    !> which pairs do not meet
-    type(material_filter_t), intent(in) :: filter
+  logical function has_other(decomposition, joints, bodies, i, j, gap, normal)
+    type(decomposition_t), intent(in) :: decomposition
+    !> of its boundaries
+    type(joints_t), intent(in) :: joints
     type(body_set_t), intent(in) :: bodies
     !> the body, and the boundary
     integer, intent(in) :: i, j
@@ -67,24 +93,27 @@ contains
     integer :: k, n
 
     has_other = .false.
-    if (.not. (boundaries(j)%is_faceted() .or. boundaries(j)%has_corners())) return
-    radius = bodies%radius(i)
-    point(:) = bodies%position(:, i) - (gap + radius)*normal
-    if (.not. boundaries(j)%is_faceted()) then
-      call boundaries(j)%find_corners(point, n, corners)
-      if (.not. is_on_rim(corners(:, 1:n), one_place*radius)) return
-    end if
-    towards(:) = 0.0_dp
-    towards(1:size(normal)) = normal
-    do k = 1, size(boundaries)
-      if (k == j .or. .not. boundaries(k)%touches()) cycle
-      if (filter%lets_pass(bodies, boundaries, i, -k)) cycle
-      call meet_at(boundaries(k), point, towards, one_edge*radius, flat, has_it, rises_there)
-      if (has_it .and. .not. rises_there) call meet_at(boundaries(k), point, towards, one_place*radius, flat, has_it, rises_there)
-      if (.not. has_it) cycle
-      has_other = comes_before(boundaries, k, j, bodies%position(:, i), gap + radius, equal*radius)
-      if (has_other) return
-    end do
+    associate (boundaries => decomposition%boundaries)
+      if (.not. (boundaries(j)%is_faceted() .or. boundaries(j)%has_corners())) return
+      radius = bodies%radius(i)
+      point(:) = bodies%position(:, i) - (gap + radius)*normal
+      if (.not. boundaries(j)%is_faceted()) then
+        call boundaries(j)%find_corners(point, n, corners)
+        if (.not. is_on_rim(corners(:, 1:n), one_place*radius)) return
+      end if
+      towards(:) = 0.0_dp
+      towards(1:size(normal)) = normal
+      do k = 1, size(boundaries)
+        if (k == j .or. joints%reach(k) < 0.0_dp) cycle
+        if (sum((point - joints%middle(1:size(point), k))**2) > (joints%reach(k) + one_edge*radius)**2) cycle
+        if (decomposition%rule%filter%lets_pass(bodies, boundaries, i, -k)) cycle
+        call meet_at(boundaries(k), point, towards, one_edge*radius, flat, has_it, rises_there)
+        if (has_it .and. .not. rises_there) call meet_at(boundaries(k), point, towards, one_place*radius, flat, has_it, rises_there)
+        if (.not. has_it) cycle
+        has_other = comes_before(boundaries, k, j, bodies%position(:, i), gap + radius, equal*radius)
+        if (has_other) return
+      end do
+    end associate
   end function has_other
 
   !> Whether boundary `k` is nearer to a point than boundary `j`, or as near and before it.

@@ -174,7 +174,9 @@ contains
     part(in_speeds) = part(in_speeds) + sqrt(square)
     part(in_moving) = part(in_moving) + 0.5_dp*bodies%mass(k)*square
     call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_kinetic))
-    if (bodies%no > 0) call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_moving))
+    if (bodies%no > 0) then
+      if (bodies%shape(k) > 0) call figures%add_rotation(bodies, k, bodies%velocity(:, k), part(in_moving))
+    end if
     do d = 1, nd
       part(in_momentum + d) = part(in_momentum + d) + bodies%mass(k)*bodies%velocity(d, k)
     end do

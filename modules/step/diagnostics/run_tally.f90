@@ -35,8 +35,8 @@ module gravier_run_tally
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
-    !> steps whose motion is not told from the errors of their solves, and the way of the centre of mass of the free grains and of each
-    !> boundary that forces move in these (3), (3, boundaries) [m]
+    !> steps whose motion is not told from the errors of their solves, and the way in these of the centre of mass of the free grains
+    !> and of each boundary that forces move (3), (3, boundaries) [m]
     integer(i8) :: unresolved = 0
     real(dp) :: way(3) = 0.0_dp
     real(dp), allocatable :: way_of_boundary(:, :)
@@ -173,8 +173,8 @@ contains
     self%path = self%path + path
   end subroutine run_tally_add_step
 
-  !> Add the ways of a step whose motion is not told from the error of its solve, which has been added. Steps without an error, or in
-  !> which bodies moved faster before, are none.
+  !> Add the ways of a step whose motion is not told from the error of its solve, which has been added. Steps without an error, or
+  !> in which bodies moved faster before, are none.
   pure subroutine run_tally_add_ways(self, h, momentum, mass, boundaries)
     class(run_tally_t), intent(inout) :: self
     !> [s]; of the free grains [kg m/s], [kg]
@@ -198,8 +198,8 @@ contains
     end do
   end subroutine run_tally_add_ways
 
-  !> Add the way of a step at a velocity, of which no more counts than the errors may be: what is faster, such as grains in the air, is
-  !> not one of the bodies in contact.
+  !> Add the way of a step at a velocity, of which no more counts than the errors may be: what is faster, such as grains in the air,
+  !> is not one of the bodies in contact.
   pure subroutine add_way(velocity, h, most, way)
     !> [m/s], [s], [m/s]
     real(dp), intent(in) :: velocity(3), h, most

@@ -10,6 +10,7 @@ module gravier_cell_drive
   use gravier_contact_problem, only: contact_problem_t
   use gravier_cell_response, only: respond, carry_along
   use gravier_decomposition, only: decomposition_t
+  use gravier_imposed_motion, only: steps_beside
   implicit none
   private
   public :: cell_drive_t, cell_components, cell_component, component_row, component_column, stress_sign, carry_grains, &
@@ -119,15 +120,15 @@ contains
       motion%free = motion%before - volume*motion%impulse/motion%inertia
     end where
     motion%now(:, :) = motion%free
-    if (allocated(self%table%has)) motion%fastest = fastest_beside(self, nd, time)
+    if (allocated(self%table%has)) motion%fastest = fastest_beside(self, nd, time, steps_beside*h)
   end subroutine cell_drive_begin_step
 
-  !> Norm of the rates that are given, the larger one of the rows of the table before and after a time [1/s].
-  pure real(dp) function fastest_beside(self, nd, time) result(fastest)
+  !> Norm of the rates that are given, the larger one of some duration before and after a time [1/s].
+  pure real(dp) function fastest_beside(self, nd, time, duration) result(fastest)
     type(cell_drive_t), intent(in) :: self
     integer, intent(in) :: nd
     !> [s]
-    real(dp), intent(in) :: time
+    real(dp), intent(in) :: time, duration
     real(dp) :: rate(3, 3)
     integer :: k, side
 
@@ -136,7 +137,7 @@ contains
       rate(:, :) = merge(0.0_dp, self%rate, self%driven)
       do k = 1, cell_components(nd)
         if (self%table%has(k)) rate(component_row(cell_component(k, nd)), component_column(cell_component(k, nd))) = &
-          & self%table%beside(k, time, side)
+          & self%table%at(k, time + side*duration)
       end do
       fastest = max(fastest, norm2(rate))
     end do

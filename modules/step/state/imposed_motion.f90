@@ -6,7 +6,10 @@ module gravier_imposed_motion
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: imposed_motion_t, find_imposed, largest_imposed
+  public :: imposed_motion_t, find_imposed, largest_imposed, steps_beside
+
+  !> steps before and after a time within which drives are looked at
+  integer, parameter :: steps_beside = 10
 
   !> Of a time.
   type :: imposed_motion_t
@@ -41,8 +44,8 @@ contains
     motion%difference = max(motion%difference, norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*diameter)
   end subroutine find_imposed
 
-  !> The largest difference of a time and of the times beside it in tables and oscillations, so that a drive which starts from
-  !> rest or turns round counts with the speed that it comes to [m/s].
+  !> The largest difference of a time and of the times ten steps before and after it, so that a drive which starts from rest or
+  !> turns round counts with what it changes in ten steps: an error of a tenth of that is what it changes in one [m/s].
   pure real(dp) function largest_imposed(nd, boundaries, lever, diameter, physics, time, now) result(largest)
     integer, intent(in) :: nd
     type(boundary_t), intent(in) :: boundaries(:)
@@ -54,7 +57,7 @@ contains
     !> what is imposed at that time
     type(imposed_motion_t), intent(in) :: now
     type(imposed_motion_t) :: beside
-    real(dp) :: velocity(3, size(boundaries)), spin(3, size(boundaries))
+    real(dp) :: velocity(3, size(boundaries)), spin(3, size(boundaries)), then
     logical :: changes
     integer :: b, d, side
 
@@ -66,10 +69,10 @@ contains
     if (.not. changes) return
     do side = -1, 1, 2
       do b = 1, size(boundaries)
-        velocity(:, b) = 0.0_dp
+        then = boundaries(b)%drive%time_beside(time, side*steps_beside*physics%h)
         do d = 1, 3
-          velocity(d, b) = boundaries(b)%drive%velocity_beside(d, time, side)
-          spin(d, b) = boundaries(b)%drive%spin_beside(d, time, side)
+          velocity(d, b) = boundaries(b)%drive%velocity_at(d, then)
+          spin(d, b) = boundaries(b)%drive%spin_at(d, then)
         end do
       end do
       call compare(nd, boundaries, velocity, spin, lever, physics, beside)

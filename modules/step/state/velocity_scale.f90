@@ -5,8 +5,8 @@
 !>     load   what loads do to the mean grain in a step (mass m, diameter d):
 !>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
 !>            root mean square of what applied forces add to velocities; of attractions, where there is no other load
-!>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; while a drive starts or
-!>            turns round, as soon as it comes to its next row or to a quarter of its period
+!>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; now, ten steps
+!>            before or ten steps later, which counts where a drive starts or turns round
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
 !>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other

@@ -385,8 +385,9 @@ contains
     call check_close(b%drive%velocity_at(2, 1.0e6_dp + 0.0625_dp), 1.0_dp, 1.0e-8_dp, "velocity where it turns round")
     call check_close(b%drive%velocity_at(2, 0.1875_dp), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "velocity half-way")
     call check_close(b%drive%velocity_at(1, 0.1875_dp), 0.0_dp, 0.0_dp, "velocity along another axis")
-    call check_close(b%drive%velocity_beside(2, 0.0625_dp, 1), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "a quarter of a period later")
-    call check_close(b%drive%velocity_beside(2, 0.0625_dp, -1), 1.0_dp + 2.0_dp*pi, 1.0e-14_dp, "a quarter of a period before")
+    call check_close(b%drive%time_beside(0.0625_dp, 9.0_dp), 0.1875_dp, 0.0_dp, "a quarter of a period later")
+    call check_close(b%drive%time_beside(0.0625_dp, -9.0_dp), -0.0625_dp, 0.0_dp, "a quarter of a period before")
+    call check_close(b%drive%time_beside(0.0625_dp, 0.0625_dp), 0.125_dp, 0.0_dp, "less than a quarter of a period later")
     call b%drive%find_extremes(times)
     do k = 1, 2
       call check_close(abs(b%drive%velocity_at(2, times(k)) - 1.0_dp), 2.0_dp*pi, 1.0e-14_dp, "velocity at an extreme")
@@ -396,7 +397,6 @@ contains
     b%drive%rotation_oscillation(3) = 0.1_dp
     call check(b%drive%turns() .and. b%drive%turns_about(3) .and. .not. b%drive%turns_about(1), "it turns about one axis")
     call check_close(b%drive%spin_at(3, 0.1875_dp), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation")
-    call check_close(b%drive%spin_beside(3, 0.0625_dp, 1), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation beside")
     b%drive%rotation_oscillation(3) = 0.0_dp
     low = 0.0_dp
     high = 0.0_dp

@@ -5,7 +5,7 @@ program test_wall_joints
   use gravier_manifold, only: manifold_t
   use gravier_surface_registry, only: make_surface
   use gravier_facet_contacts, only: keep_corners
-  use gravier_wall_joints, only: is_in_joint, may_join
+  use gravier_wall_joints, only: is_in_joint, joints_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: tolerance = 1.0e-7_dp, slack = 1.0e-3_dp
@@ -70,21 +70,30 @@ contains
   !> One boundary joins nothing, two that end may, and what is taken away or goes on for ever does not.
   subroutine test_walls_that_join()
     type(boundary_t) :: wall(2)
+    type(joints_t) :: joints
     real(dp) :: edge(3, 2)
 
     edge(:, :) = 0.0_dp
     edge(1, 1) = 1.0_dp
     call put("segment", [0.0_dp, 0.0_dp, 0.0_dp], edge, wall(1))
-    call check(.not. may_join(wall(1:1)), "one segment")
+    call joints%find(wall(1:1))
+    call check(.not. joints%exist, "one segment")
+    call check_close(joints%middle(1, 1), 0.5_dp, 1.0e-15_dp, "middle of a segment")
+    call check_close(joints%reach(1), 0.5_dp, 1.0e-15_dp, "half of its length")
     call put("segment", [1.0_dp, 0.0_dp, 0.0_dp], edge, wall(2))
-    call check(may_join(wall), "two segments")
+    call joints%find(wall)
+    call check(joints%exist, "two segments")
     wall(2)%present = .false.
-    call check(.not. may_join(wall), "one is taken away")
+    call joints%find(wall)
+    call check(.not. joints%exist, "one is taken away")
     wall(2)%present = .true.
     call make_surface("plane", wall(2)%surface)
-    call check(.not. may_join(wall), "a segment and a plane")
-    call make_surface("mesh", wall(2)%surface)
-    call check(may_join(wall), "a segment and a mesh")
+    call joints%find(wall)
+    call check(.not. joints%exist, "a segment and a plane")
+    call put("segment", [1.0_dp, 0.0_dp, 0.0_dp], edge, wall(2))
+    wall(2)%period(1) = 7.0_dp
+    call joints%find(wall)
+    call check(joints%reach(2) > 1.0e100_dp, "a segment in a period may be anywhere")
   end subroutine test_walls_that_join
 
   !> Both triangles of a rectangle rise from its edge.
