@@ -11,8 +11,8 @@ module gravier_wall_joints
   public :: is_in_joint, has_other, joints_t
 
   !> Of disks and spheres, in radii: distance below which edges of walls meet, below which two points are one, and below which two
-  !> distances are equal; sine of the slope below which a wall is flat. Beside a flush joint distances are equal up to sqrt(2 equal),
-  !> which is less than one_place.
+  !> distances are equal; sine of the slope below which a wall is flat. Beside a flush joint distances are equal up to
+  !> sqrt(2 equal), which is less than one_place.
   real(dp), parameter :: one_edge = 1.0e-3_dp, one_place = 2.0e-6_dp, equal = 1.0e-12_dp, flat = 1.0e-10_dp
 
   !> reach of what may be anywhere; its square is a number [m]
