@@ -68,6 +68,7 @@ class Turning(SmallScene):
                 record, stretch = self.turn(title, lattice(dimension, -0.1 * RADIUS), axis, 1e4 * MASS, 200, scene={"overlap_projection": True})
                 self.check_rigid(title, record, stretch)
                 self.assertIn("no step projected overlaps", record.run.stdout)
+                self.assertLess(record.run.history()["max_overlap"].max(), 1e-3 * RADIUS)
         # a triangle of bonded disks beside a free one that is too deep in it
         triangle = [[0.0, 0.0], [1.9 * RADIUS, 0.0], [0.95 * RADIUS, 1.7 * RADIUS]]
         grains = [Grain(place, material=1) for place in triangle] + [Grain([0.95 * RADIUS, 3.4 * RADIUS], material=2)]
