@@ -250,8 +250,8 @@ contains
       if (boundary%drive%gives(drives_force, d) .and. .not. boundary%free(d)) call refuse("f"//axes(d), &
         & "no such column where this component is not free")
     end do
-    turned = boundary%drive%gives(drives_spin, 3)
-    if (nd == 3) turned = turned .or. boundary%drive%gives(drives_spin, 1) .or. boundary%drive%gives(drives_spin, 2)
+    turned = boundary%drive%gives(drives_spin, 1) .or. boundary%drive%gives(drives_spin, 2) .or. &
+      & boundary%drive%gives(drives_spin, 3)
     if (boundary%is_driven() .and. turned) call refuse("of a rotation rate", &
       & "no such column where a component of the translation is free")
     pressed = boundary%is_plane()

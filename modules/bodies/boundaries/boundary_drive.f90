@@ -183,8 +183,7 @@ contains
   !> Whether it may move the boundary at some time.
   pure logical function boundary_drive_moves(self) result(moves)
     class(boundary_drive_t), intent(in) :: self
-    moves = any(abs(self%velocity) > 0.0_dp) .or. any(abs(self%spin) > 0.0_dp) .or. self%oscillates() .or. &
-      & allocated(self%table%has)
+    moves = any(abs(self%velocity) > 0.0_dp) .or. any(abs(self%spin) > 0.0_dp) .or. self%changes()
   end function boundary_drive_moves
 
   !> Whether it may turn the boundary at some time.

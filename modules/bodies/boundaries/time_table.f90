@@ -1,5 +1,5 @@
-!> Quantities given in a table against time: linear between the rows, and constant before the first and after the last or begun
-!> anew there.
+!> Quantities given in a table against time: linear between the rows, constant before the first. After the last they are constant,
+!> or the table begins anew.
 module gravier_time_table
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -173,43 +173,30 @@ contains
     integer, intent(in) :: k
     !> [s]
     real(dp), intent(in) :: time
-    integer :: low, high
-    real(dp) :: share
-
-    call find_rows(self, time, low, high, share)
-    value = self%value(k, low)
-    if (high > low) value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
-  end function time_table_at
-
-  !> The rows between which a time lies, twice the same row outside of the table, and how far it is from the first to the second.
-  pure subroutine find_rows(self, time, low, high, share)
-    type(time_table_t), intent(in) :: self
-    !> [s]
-    real(dp), intent(in) :: time
-    integer, intent(out) :: low, high
-    !> between 0 and 1
-    real(dp), intent(out) :: share
-    integer :: middle
-    real(dp) :: at
+    integer :: low, high, middle
+    real(dp) :: at, share
 
     low = 1
     high = size(self%time)
-    share = 0.0_dp
     at = time
     if (self%period > 0.0_dp .and. time > self%time(high)) at = self%time(low) + modulo(time - self%time(low), self%period)
-    if (at <= self%time(low)) high = low
-    if (at >= self%time(size(self%time))) low = high
-    if (high == low) return
-    do while (high - low > 1)
-      middle = (low + high)/2
-      if (self%time(middle) <= at) then
-        low = middle
-      else
-        high = middle
-      end if
-    end do
-    share = (at - self%time(low))/(self%time(high) - self%time(low))
-  end subroutine find_rows
+    if (at <= self%time(low)) then
+      value = self%value(k, low)
+    else if (at >= self%time(high)) then
+      value = self%value(k, high)
+    else
+      do while (high - low > 1)
+        middle = (low + high)/2
+        if (self%time(middle) <= at) then
+          low = middle
+        else
+          high = middle
+        end if
+      end do
+      share = (at - self%time(low))/(self%time(high) - self%time(low))
+      value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
+    end if
+  end function time_table_at
 
   !> Whether some quantity has another value later than it has at a time. The table has been read.
   pure logical function time_table_changes_after(self, time) result(changes)

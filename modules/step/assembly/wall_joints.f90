@@ -22,7 +22,8 @@ module gravier_wall_joints
   type :: joints_t
     !> there are several of them
     logical :: exist = .false.
-    !> (3, boundaries), (boundaries): below 0 of a boundary that joins nothing, without end in scenes with a period [m]
+    !> where there are: (3, boundaries), (boundaries), below 0 of a boundary that joins nothing, without end in scenes with a
+    !> period [m]
     real(dp), allocatable :: middle(:, :), reach(:)
   contains
     procedure :: find => joints_find
@@ -58,12 +59,17 @@ contains
     real(dp) :: corner(3, 8)
     integer :: b, k, n
 
+    n = 0
+    do b = 1, size(boundaries)
+      if (joins(boundaries(b))) n = n + 1
+    end do
+    self%exist = n > 1
+    if (.not. self%exist) return
     if (allocated(self%reach)) deallocate (self%middle, self%reach)
     allocate (self%middle(3, size(boundaries)), source=0.0_dp)
     allocate (self%reach(size(boundaries)), source=-1.0_dp)
     do b = 1, size(boundaries)
-      if (.not. boundaries(b)%touches()) cycle
-      if (.not. (boundaries(b)%has_corners() .or. boundaries(b)%is_faceted())) cycle
+      if (.not. joins(boundaries(b))) cycle
       self%reach(b) = anywhere
       if (any(boundaries(b)%period > 0.0_dp)) cycle
       call boundaries(b)%surface%find_box(n, corner)
@@ -73,8 +79,15 @@ contains
         self%reach(b) = max(self%reach(b), norm2(corner(:, k) - self%middle(:, b)))
       end do
     end do
-    self%exist = count(self%reach >= 0.0_dp) > 1
   end subroutine joints_find
+
+  !> Whether a boundary is there that may continue another one.
+  pure logical function joins(boundary)
+    type(boundary_t), intent(in) :: boundary
+
+    joins = boundary%touches()
+    if (joins) joins = boundary%has_corners() .or. boundary%is_faceted()
+  end function joins
 
   !> Whether a contact of a disk or a sphere with a segment, a rectangle or a mesh is none, because the wall goes on with another
   !> boundary: its point lies in a hollow of the wall, or the other boundary has the contact, too. Only a boundary that is nearer,
@@ -199,8 +212,13 @@ contains
     logical, intent(inout) :: has_it, rises_there
     real(dp), parameter :: here(3) = [0.0_dp, 0.0_dp, 0.0_dp]
 
-    has_it = has_it .or. has_point(corner, here, tolerance)
-    rises_there = rises_there .or. rises(corner, normal, here, tolerance, slack)
+    if (rises(corner, normal, here, tolerance, slack)) then
+      ! it has the point
+      rises_there = .true.
+      has_it = .true.
+    else if (.not. has_it) then
+      has_it = has_point(corner, here, tolerance)
+    end if
   end subroutine look
 
 end module gravier_wall_joints
