@@ -61,7 +61,7 @@ contains
     run%mean_radius = simulation%decomposition%rule%mean_radius
     run%failed = narrow(simulation%failed)
     run%residual = simulation%effort%worst
-    run%overlap = simulation%worst_overlap
+    run%overlap = max(simulation%tally%start_overlap, simulation%tally%later_overlap)
     run%iterations = simulation%effort%iterations
     run%solve_seconds = comm%highest(simulation%effort%seconds)
     run%run_seconds = comm%highest(run%run_seconds)

@@ -13,6 +13,7 @@ module gravier_time_stepper
   use gravier_solve, only: solve_contacts
   use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged, solve_unbounded
   use gravier_fallback, only: fallback_t
+  use gravier_refinement, only: refinement_t
   use gravier_decomposition, only: decomposition_t
   use gravier_removal, only: some_leave, remove_grains, drop_grains
   use gravier_inflow, only: inflow_t
@@ -24,6 +25,7 @@ module gravier_time_stepper
   use gravier_pair_laws, only: conclude_pairs
   use gravier_contact_springs, only: conclude_springs, measure_springs
   use gravier_velocity_scale, only: velocity_scale_t
+  use gravier_drift, only: drift_t
   use gravier_body_motion, only: move_to_middle, drive, move_to_end
   use gravier_fast_grains, only: count_fast
   use gravier_velocity_return, only: take_velocities
@@ -84,6 +86,8 @@ module gravier_time_stepper
     type(inflow_t) :: inflow
     class(method_t), allocatable :: method
     type(fallback_t) :: fallback
+    !> what makes solves more exact than asked for while the scene drifts
+    type(refinement_t) :: refinement
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
     type(backoff_t) :: pass_backoff
@@ -131,13 +135,12 @@ module gravier_time_stepper
     !> steps, the last ones, in which the kinetic energy of the grains was at most `rest_energy` [J] and no grain was to enter
     integer :: quiet = 0
     real(dp) :: rest_energy = 0.0_dp
-    !> since this run began or went on from a checkpoint: the largest overlap [m], and what solves took
-    real(dp) :: worst_overlap = 0.0_dp
+    !> motion that is not told from errors of solves
+    type(drift_t) :: drift
+    !> since this run began or went on from a checkpoint: what solves took
     type(effort_t) :: effort
     !> how solves ended and what was mended, since this run began or went on from a checkpoint
     type(run_tally_t) :: tally
-    !> over all steps of this run: contacts that were left out, and solves that were made anew because bodies woke
-    integer(i8) :: slept = 0, woken = 0
   contains
     procedure :: assemble => time_stepper_assemble
     procedure :: advance => time_stepper_advance
@@ -205,6 +208,8 @@ contains
     do tries = 1, most_tries + 1
       call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
+      call self%refinement%go_on(self%problem, self%method, control, self%drift%goal_share(self%velocity_scale%diameter), &
+        & figures%solve, error, watch)
       self%messages = self%messages + self%problem%shared%messages
       self%values = self%values + self%problem%shared%values
       if (allocated(error) .or. figures%solve%status == solve_diverged) return
@@ -264,6 +269,7 @@ contains
   subroutine set_up(self, figures)
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(inout) :: figures
+    real(dp) :: area(size(self%decomposition%boundaries))
     integer :: s
 
     call self%cell_drive%begin_step(self%decomposition%period, self%decomposition%nd, self%mass, self%physics%h, &
@@ -291,10 +297,12 @@ contains
     if (self%physics%laws%yields) call measure_springs(self%problem, self%tally%deformation, self%tally%stiffest)
     call figures%deep%find(self%decomposition, self%halo, self%problem, self%tally%deformation)
     self%largest_overlap = figures%max_overlap
-    self%worst_overlap = max(self%worst_overlap, figures%max_overlap)
     if (figures%contacts > 0) self%imbalance = real(figures%interface_statistics%most_contacts, dp) &
       & *self%decomposition%n_subdomains/real(figures%contacts, dp)
-    call measure_velocity_scale(self)
+    call start_timer(phase_setup)
+    call find_load_areas(self%decomposition, area)
+    call self%velocity_scale%measure(self%decomposition, self%physics, self%problem, self%time + self%physics%h, area)
+    call stop_timer(phase_setup)
   end subroutine set_up
 
   !> Give all grains an applied force, of 0. The same on every rank, between two steps.
@@ -393,7 +401,7 @@ contains
     end associate
   end subroutine note_solve
 
-  !> Note what a step has done, and count it.
+  !> Note what a step has done, and count it. Collective.
   subroutine note_step(self, figures, shifts)
     class(time_stepper_t), intent(inout) :: self
     type(step_figures_t), intent(inout) :: figures
@@ -404,7 +412,7 @@ contains
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
     call self%tally%add_step(figures%max_overlap, figures%interface_statistics, shifts/self%overlap_allowed > rounded_shift, &
       & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains)
-    call self%tally%add_ways(self%physics%h, self%balance%momentum, self%mass, self%decomposition%boundaries)
+    call self%drift%note(self%decomposition, self%physics, self%mass, self%tally%own_velocity, self%tally%velocity_error)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic
@@ -413,20 +421,9 @@ contains
     call self%population%note(self%n_grains - self%n_glued, self%mass)
     self%left = self%left + figures%left
     self%fast = self%fast + figures%fast
-    self%slept = self%slept + figures%asleep
-    self%woken = self%woken + figures%tries - 1
+    self%tally%slept = self%tally%slept + figures%asleep
+    self%tally%woken = self%tally%woken + figures%tries - 1
   end subroutine note_step
-
-  !> Find the velocity against which errors of the solve to come are compared. Collective.
-  subroutine measure_velocity_scale(self)
-    class(time_stepper_t), intent(inout) :: self
-    real(dp) :: area(size(self%decomposition%boundaries))
-
-    call start_timer(phase_setup)
-    call find_load_areas(self%decomposition, area)
-    call self%velocity_scale%measure(self%decomposition, self%physics, self%problem, self%time + self%physics%h, area)
-    call stop_timer(phase_setup)
-  end subroutine measure_velocity_scale
 
   !> Bring views and lists up to date, without the grains that leave, or make them anew with the impulses carried over. Collective.
   subroutine list_neighbours(self, figures)
@@ -488,9 +485,8 @@ contains
     self%velocities_set = .false.
     self%resting = resting_t()
     self%is_whole = .true.
-    self%slept = 0
-    self%woken = 0
-    self%worst_overlap = 0.0_dp
+    self%drift = drift_t()
+    self%refinement = refinement_t()
     self%effort = effort_t()
     self%tally = run_tally_t()
     self%imbalance = 1.0_dp

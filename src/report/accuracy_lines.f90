@@ -2,7 +2,8 @@
 module gravier_accuracy_lines
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
-  use gravier_run_tally, only: run_tally_t, most_drift
+  use gravier_run_tally, only: run_tally_t
+  use gravier_drift, only: most_drift
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -84,25 +85,34 @@ contains
   !> Whether the scene has moved visibly, as a whole, in steps whose motion is not told from the errors of their solves.
   pure logical function drifts(simulation)
     type(simulation_t), intent(in) :: simulation
-    drifts = simulation%tally%drift() > most_drift*simulation%velocity_scale%diameter
+    drifts = simulation%drift%length() > most_drift*simulation%velocity_scale%diameter
   end function drifts
 
-  !> How far the centre of mass, or a boundary that forces move, has come in steps whose motion is not told from the errors of their
-  !> solves, where that can be seen, and what resolves it. Errors are about proportional to the goal: half of the goal which would
-  !> keep the way below a bound does so.
+  !> How far the scene has come in steps whose motion is not told from the errors of their solves, where that can be seen, and what
+  !> resolves it; and what solves did about it. Errors are about proportional to the goal: half of the goal which would keep the way
+  !> below a bound does so.
   function drift_lines(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
     real(dp) :: way
 
     text = ""
-    if (.not. drifts(simulation)) return
-    associate (tally => simulation%tally)
-      way = tally%drift()/simulation%velocity_scale%diameter
-      text = "drift       in "//to_text(tally%unresolved)//" of "//counted(tally%steps, "step")// &
+    associate (drift => simulation%drift, refinement => simulation%refinement)
+      if (refinement%refined > 0) text = "refined     "//counted(refinement%refined, "solve")//" went on for "// &
+        & counted(refinement%iterations, "iteration")//" beyond the goal, so that errors do not add up where nothing else "// &
+        & "moves;"//newline//indent//to_text(refinement%reached)//" of them came to what they aimed at, in the end the "// &
+        & goal_text(simulation, refinement%least_share)//newline
+      if (.not. drifts(simulation)) return
+      way = drift%length()/simulation%velocity_scale%diameter
+      text = text//"drift       in "//to_text(drift%steps)//" of "//counted(int(simulation%step, i8), "step")// &
         & " bodies moved no faster than twice the velocity error of the solve, and came "//plain(way)// &
-        & " mean diameters away as a whole"//newline//indent//"that motion may be nothing but errors; the "// &
-        & goal_text(simulation, 0.5_dp*most_drift/way)//" would keep them below "//plain(most_drift)//" mean diameters"//newline
+        & " mean diameters away as a whole"//newline//indent//"that motion may be nothing but errors; "
+      if (refinement%refined > 0) then
+        text = text//"a smaller &solver "//goal_name(simulation)//", which every solve has to reach, tells"//newline
+      else
+        text = text//"the "//goal_text(simulation, 0.5_dp*most_drift/way)//" would keep them below "//plain(most_drift)// &
+          & " mean diameters"//newline
+      end if
     end associate
   end function drift_lines
 

@@ -68,9 +68,9 @@ contains
       & to_text(work%interface_iterations)//" iterations; subdomain matrices: "//to_text(counts(2))//" analyses, "// &
       & to_text(counts(3))//" factorisations"//newline
     if (simulation%fallback%taken > 0) text = text//"fallback    "//fallback_text(simulation)//newline
-    if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%slept)// &
+    if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%tally%slept)// &
       & " contacts of bodies asleep were left out, summed over all steps; "// &
-      & counted(simulation%woken, "further solve")//" because bodies woke"//newline
+      & counted(simulation%tally%woken, "further solve")//" because bodies woke"//newline
     if (simulation%method%direction_text /= "") text = text//"direction   "//simulation%method%direction_text//"; "// &
       & counted(work%lowered, "reduction")//" of l"//newline
     if (work%restarted + work%suspended > 0) text = text//"nesterov    "// &

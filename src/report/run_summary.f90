@@ -1,7 +1,7 @@
 !> The closing summary of a run, in words: whether it converged, where its time went, what would halve it.
 module gravier_run_summary
   use gravier_kinds, only: dp, i8
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, counted
   use gravier_timers, only: phase_names, n_phases, phase_neighbourhood, phase_exchange, phase_factorise, phase_interface, &
     & phase_interface_solve, phase_reduction, phase_diagnostics, phase_output
   use gravier_convergence_history, only: at_tolerance
@@ -194,9 +194,10 @@ contains
       end if
       if (tally%later_overlap > deep*simulation%mean_half_thickness .and. simulation%mean_half_thickness > 0.0_dp) text = text// &
         & "; overlaps came to "//plain(tally%later_overlap/simulation%mean_half_thickness)//" of "//mean_size_name(simulation)
-      if (drifts(simulation)) text = text//"; in "//to_text(tally%unresolved)//" of "//steps// &
+      if (drifts(simulation)) text = text//"; in "//to_text(simulation%drift%steps)//" of the "// &
+        & counted(int(simulation%step, i8), "step")// &
         & " bodies moved by no more than the errors of solves, and came "// &
-        & plain(tally%drift()/simulation%velocity_scale%diameter)//" mean diameters away: see `drift`"
+        & plain(simulation%drift%length()/simulation%velocity_scale%diameter)//" mean diameters away: see `drift`"
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate

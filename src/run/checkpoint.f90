@@ -14,6 +14,8 @@ module gravier_checkpoint
   use gravier_population, only: population_words, population_record
   use gravier_backoff, only: backoff_words, backoff_record
   use gravier_fallback, only: fallback_words, fallback_record
+  use gravier_refinement, only: refinement_words, refinement_record
+  use gravier_drift, only: drift_words, drift_record
   use gravier_impulse_memory, only: pair_record
   use gravier_diagnostics, only: diagnostics_t
   use gravier_region_means, only: region_means_t, regions_key, samples_record
@@ -47,7 +49,8 @@ contains
       & "population: "//population_record//", "//to_text(population_words)//" words"//newline// &
       & "passes: "//backoff_record//", "//to_text(backoff_words)//" words"//newline// &
       & "second method: "//fallback_record//", "//to_text(fallback_words)//" words"//newline// &
-      & "solves: figure_ratio"//newline
+      & "refinement: "//refinement_record//", "//to_text(refinement_words)//" words"//newline// &
+      & "drift: "//drift_record//newline//"solves: figure_ratio"//newline
     call registered_diagnostics(diagnostics)
     do k = 1, size(diagnostics)
       associate (features => diagnostics(k)%diagnostic%features())
@@ -68,7 +71,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8), allocatable :: words(:)
-    integer(i8) :: seen(population_words), passes(backoff_words), takeovers(fallback_words)
+    integer(i8) :: seen(population_words), passes(backoff_words), takeovers(fallback_words), refinements(refinement_words)
 
     if (allocated(error)) return
     call file%create(simulation%comm, path, records_text(), error)
@@ -104,6 +107,12 @@ contains
     call file%write_array("passes", passes, error)
     call simulation%fallback%get_state(takeovers)
     call file%write_array("second_method", takeovers, error)
+    call simulation%refinement%get_state(refinements)
+    call file%write_array("refinement", refinements, error)
+    deallocate (words)
+    allocate (words(drift_words(size(simulation%decomposition%boundaries))))
+    call simulation%drift%get_state(words)
+    call file%write_array("drift", words, error)
     call file%write_scalar("figure_ratio", simulation%figure_ratio, error)
     call simulation%inflow%get_state(words)
     call file%write_array("insertions", words, error)
@@ -144,7 +153,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8) :: step, last_written, builds, quiet
-    integer :: own_step, own_last, own_quiet
+    integer :: own_step, own_last, own_quiet, n
     real(dp) :: rest_energy
     integer(i8), allocatable :: words(:)
     character(len=:), allocatable :: division
@@ -180,6 +189,11 @@ contains
     if (.not. allocated(error)) call simulation%pass_backoff%set_state(words)
     call file%read_array("second_method", fallback_words, fallback_words, words, error)
     if (.not. allocated(error)) call simulation%fallback%set_state(words)
+    call file%read_array("refinement", refinement_words, refinement_words, words, error)
+    if (.not. allocated(error)) call simulation%refinement%set_state(words)
+    n = drift_words(size(simulation%decomposition%boundaries))
+    call file%read_array("drift", n, n, words, error)
+    if (.not. allocated(error)) call simulation%drift%set_state(words)
     call file%read_scalar("figure_ratio", simulation%figure_ratio, error)
     call take_count(step, path//": step", own_step, error)
     ! -1 where none was written

@@ -137,6 +137,20 @@ class Restart(RunTestCase):
         for stop, before, after in ((95, 1, 2), (110, 2, 1)):
             self.one_restart(case, stop, before, after, straight)
 
+    def test_refined(self):
+        """A load that grows on grains that do not give way: solves go on beyond their goal, by how far the scene has come in all steps."""
+        case = {"scene": {"bodies": "column", "column_count": 12, "radius": 0.05, "mass": 0.7, "gravity": [0.0, 0.0]},
+                "boundary": [{"shape": "plane", "name": "lid", "point": [0.0, 1.2], "normal": [0.0, -1.0], "free": [False, True], "mass": 0.7,
+                              "table": "../force.csv"}],
+                "time": {"step": 1 / 512, "steps": 90}, "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 3},
+                "output": {"every": 10, "checkpoint_every": 5}}
+        write(self.here("force.csv"), "time,fy\n0,0\n1,-2000\n")
+        straight = self.straight("refined", case)
+        words = contents(os.path.join(straight, "results", "checkpoint.h5"))["/arrays/drift"]
+        self.assertGreater(words[0], 80)
+        for stop, before, after in ((45, 1, 2), (70, 2, 1)):
+            self.one_restart(case, stop, before, after, straight)
+
     def test_methods(self):
         """Every method, and without a warm start; in 3D with walls of another friction."""
         cases = {

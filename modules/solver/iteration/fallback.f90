@@ -121,7 +121,6 @@ contains
     type(solve_report_t), intent(inout) :: report
     type(solve_report_t), intent(in) :: second
     type(solve_report_t) :: first
-    integer :: n
 
     first = report
     report = second
@@ -137,16 +136,7 @@ contains
       report%status = first%status
       report%creep = first%creep
     end if
-    if (.not. allocated(first%trace)) return
-    n = first%n_trace
-    deallocate (report%trace)
-    allocate (report%trace(size(first%trace, 1), n + second%n_trace))
-    report%trace(:, 1:n) = first%trace(:, 1:n)
-    report%trace(:, n + 1:) = second%trace(:, 1:second%n_trace)
-    ! iterations and seconds go on
-    report%trace(1, n + 1:) = report%trace(1, n + 1:) + first%iterations
-    report%trace(6, n + 1:) = report%trace(6, n + 1:) + first%seconds
-    report%n_trace = n + second%n_trace
+    if (allocated(first%trace)) call report%follow_trace(first)
   end subroutine join
 
   pure subroutine fallback_get_state(self, words)

@@ -91,6 +91,7 @@ module gravier_solve_report
     real(dp), allocatable :: trace(:, :)
   contains
     procedure :: keep_trace => solve_report_keep_trace
+    procedure :: follow_trace => solve_report_follow_trace
   end type solve_report_t
 
   !> Who is told how a solve goes on.
@@ -133,5 +134,22 @@ contains
       row(6) = seconds
     end associate
   end subroutine solve_report_keep_trace
+
+  !> Put the trace of the solve that this one went on from before its own: iterations and seconds go on.
+  pure subroutine solve_report_follow_trace(self, first)
+    class(solve_report_t), intent(inout) :: self
+    type(solve_report_t), intent(in) :: first
+    real(dp), allocatable :: both(:, :)
+    integer :: n
+
+    n = first%n_trace
+    allocate (both(n_traced, n + self%n_trace))
+    both(:, 1:n) = first%trace(:, 1:n)
+    both(:, n + 1:) = self%trace(:, 1:self%n_trace)
+    both(1, n + 1:) = both(1, n + 1:) + first%iterations
+    both(6, n + 1:) = both(6, n + 1:) + first%seconds
+    self%n_trace = n + self%n_trace
+    call move_alloc(both, self%trace)
+  end subroutine solve_report_follow_trace
 
 end module gravier_solve_report

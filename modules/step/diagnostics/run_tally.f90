@@ -4,22 +4,17 @@
 module gravier_run_tally
   use gravier_kinds, only: dp, i8
   use gravier_creeping_groups, only: creep_t
-  use gravier_boundary, only: boundary_t
   use gravier_interface, only: interface_statistics_t
   use gravier_solve_report, only: solve_report_t, solve_converged, solve_exhausted, solve_diverged, solve_stagnated, &
     & solve_unbounded
   implicit none
   private
-  public :: run_tally_t, relative_error, far_off, often_mended, most_drift
+  public :: run_tally_t, relative_error, far_off, often_mended
 
   !> velocity error over its scale beyond which the accuracy of a step counts as unknown
   real(dp), parameter :: far_off = 0.5_dp
   !> share of the steps with projected overlaps beyond which results are not those of the contact law
   real(dp), parameter :: often_mended = 0.1_dp
-  !> errors of its solve below which the motion of a step is not told from them
-  real(dp), parameter :: unresolved_times = 2.0_dp
-  !> diameters by which a scene may move as a whole in the steps whose motion is not told from the errors of their solves
-  real(dp), parameter :: most_drift = 0.01_dp
   !> times the overlap of the first step, or the overlap that is allowed, from which on overlaps have grown
   real(dp), parameter :: grown = 2.0_dp
   !> kinds of velocity scales that are told apart
@@ -35,11 +30,6 @@ module gravier_run_tally
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
     real(dp) :: shift = 0.0_dp, path = 0.0_dp
-    !> steps whose motion is not told from the errors of their solves, and the way in these of the centre of mass of the free grains
-    !> and of each boundary that forces move (3), (3, boundaries) [m]
-    integer(i8) :: unresolved = 0
-    real(dp) :: way(3) = 0.0_dp
-    real(dp), allocatable :: way_of_boundary(:, :)
     !> largest overlap of the first step, which is that of the start, and of all later steps [m]
     real(dp) :: start_overlap = 0.0_dp, later_overlap = 0.0_dp
     !> of compliant contacts: largest deformation [m], largest product of the step and the frequency of a normal spring
@@ -63,14 +53,14 @@ module gravier_run_tally
     integer(i8) :: steps_left_out = 0, most_left_out = 0
     !> steps in which intact bonds were stretched, and the most of them in one
     integer(i8) :: steps_stretched = 0, most_stretched = 0
+    !> contacts that were left out because they sleep, and solves that were made anew because bodies woke
+    integer(i8) :: slept = 0, woken = 0
     !> of the solve that stagnated with most contacts that creep, and the largest change over the velocity scale of all such solves
     type(creep_t) :: creep
     real(dp) :: worst_creep = 0.0_dp
   contains
     procedure :: add_solve => run_tally_add_solve
     procedure :: add_step => run_tally_add_step
-    procedure :: add_ways => run_tally_add_ways
-    procedure :: drift => run_tally_drift
     procedure :: missed => run_tally_missed
     procedure :: mended_share => run_tally_mended_share
     procedure :: overlaps_grew => run_tally_overlaps_grew
@@ -172,57 +162,6 @@ contains
     self%shift = self%shift + shift
     self%path = self%path + path
   end subroutine run_tally_add_step
-
-  !> Add the ways of a step whose motion is not told from the error of its solve, which has been added. Steps without an error, or
-  !> in which bodies moved faster before, are none.
-  pure subroutine run_tally_add_ways(self, h, momentum, mass, boundaries)
-    class(run_tally_t), intent(inout) :: self
-    !> [s]; of the free grains [kg m/s], [kg]
-    real(dp), intent(in) :: h, momentum(3), mass
-    !> with the velocities of the end of the step
-    type(boundary_t), intent(in) :: boundaries(:)
-    real(dp) :: velocity(3), most
-    integer :: b
-
-    if (.not. self%own_velocity < unresolved_times*self%velocity_error) return
-    self%unresolved = self%unresolved + 1
-    most = unresolved_times*self%velocity_error
-    if (mass > 0.0_dp) then
-      velocity(:) = momentum/mass
-      call add_way(velocity, h, most, self%way)
-    end if
-    if (.not. allocated(self%way_of_boundary)) allocate (self%way_of_boundary(3, size(boundaries)), source=0.0_dp)
-    do b = 1, size(boundaries)
-      velocity(:) = merge(boundaries(b)%velocity, 0.0_dp, boundaries(b)%free)
-      call add_way(velocity, h, most, self%way_of_boundary(:, b))
-    end do
-  end subroutine run_tally_add_ways
-
-  !> Add the way of a step at a velocity, of which no more counts than the errors may be: what is faster, such as grains in the air,
-  !> is not one of the bodies in contact.
-  pure subroutine add_way(velocity, h, most, way)
-    !> [m/s], [s], [m/s]
-    real(dp), intent(in) :: velocity(3), h, most
-    !> [m]
-    real(dp), intent(inout) :: way(3)
-    real(dp) :: share
-
-    share = 1.0_dp
-    if (norm2(velocity) > most) share = most/norm2(velocity)
-    way(:) = way + share*h*velocity
-  end subroutine add_way
-
-  !> The longest of these ways [m].
-  pure real(dp) function run_tally_drift(self) result(drift)
-    class(run_tally_t), intent(in) :: self
-    integer :: b
-
-    drift = norm2(self%way)
-    if (.not. allocated(self%way_of_boundary)) return
-    do b = 1, size(self%way_of_boundary, 2)
-      drift = max(drift, norm2(self%way_of_boundary(:, b)))
-    end do
-  end function run_tally_drift
 
   !> Solves that missed their criterion.
   pure integer(i8) function run_tally_missed(self) result(missed)

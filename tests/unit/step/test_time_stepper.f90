@@ -14,7 +14,6 @@ program test_time_stepper
   use gravier_fast_grains, only: count_fast
   use gravier_failed_contact, only: find_divergence, find_largest_impulse
   use gravier_interface, only: interface_statistics_t
-  use gravier_boundary, only: boundary_t
   use gravier_run_tally, only: run_tally_t
   use gravier_search_direction, only: search_direction_t, chosen_direction
   use gravier_method_options, only: method_options_t
@@ -220,7 +219,6 @@ contains
   subroutine test_tally()
     type(run_tally_t) :: tally
     type(solve_report_t) :: solve
-    type(boundary_t) :: lid(2)
 
     solve%status = solve_converged
     solve%velocity_error = 0.02_dp
@@ -264,20 +262,6 @@ contains
     call tally%add_step(0.3_dp, interface_statistics_t(), .true., 0.1_dp, 1.0_dp)
     call tally%add_step(0.1_dp, interface_statistics_t(overlapping_cores=4, stretched_bonds=2), .false., 0.0_dp, 2.0_dp)
     call tally%add_step(0.5_dp, interface_statistics_t(overlapping_cores=3, points_left_out=7), .false., 0.2_dp, 3.0_dp)
-    ! the velocity error of the last solve is 0.06 m/s, and bodies had 0.5 m/s before it; then 0.1 m/s
-    lid(2)%free(2) = .true.
-    lid(2)%velocity(:) = [3.0_dp, 0.1_dp, 7.0_dp]
-    call tally%add_ways(2.0_dp, [0.04_dp, 0.08_dp, 0.08_dp], 4.0_dp, lid)
-    call check_equal(int(tally%unresolved), 0, "a motion that is told from the error of its solve")
-    tally%own_velocity = 0.1_dp
-    call tally%add_ways(2.0_dp, [0.04_dp, 0.08_dp, 0.08_dp], 4.0_dp, lid)
-    call check_equal(int(tally%unresolved), 1, "a motion that is not")
-    call check_close(tally%drift(), 0.2_dp, 1e-12_dp, "a boundary goes farther, along the component that is free")
-    lid(2)%velocity(2) = -0.1_dp
-    call tally%add_ways(2.0_dp, [0.04_dp, 0.08_dp, 0.08_dp], 4.0_dp, lid)
-    call check_close(tally%drift(), 0.12_dp, 1e-12_dp, "it comes back, and the centre of mass does not")
-    call tally%add_ways(2.0_dp, [4.0_dp, 8.0_dp, 8.0_dp], 4.0_dp, lid)
-    call check_close(tally%drift(), 0.36_dp, 1e-12_dp, "no more than twice the error, where grains are in the air")
     call check_equal(int(tally%steps_left_out), 1, "steps in which points were left out")
     call check_equal(int(tally%most_left_out), 7, "the most points in one of them")
     call check_equal(int(tally%steps_with_cores), 2, "steps in which cores overlapped")
