@@ -10,7 +10,6 @@ module gravier_time_stepper
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
   use gravier_backoff, only: backoff_t
-  use gravier_solve, only: solve_contacts
   use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged, solve_unbounded
   use gravier_fallback, only: fallback_t
   use gravier_refinement, only: refinement_t
@@ -86,7 +85,7 @@ module gravier_time_stepper
     type(inflow_t) :: inflow
     class(method_t), allocatable :: method
     type(fallback_t) :: fallback
-    !> what makes solves more exact than asked for while the scene drifts
+    !> solves aim at less error than the goal while the scene drifts
     type(refinement_t) :: refinement
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
@@ -195,7 +194,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_control_t) :: control
-    real(dp) :: seconds
+    real(dp) :: seconds, share
     integer :: tries, iterations
     logical :: woken
 
@@ -205,11 +204,10 @@ contains
     control%figure_ratio = self%figure_ratio
     ! a pass over layers would replace the impulses that were given
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
+    share = self%drift%goal_share(self%velocity_scale%diameter, self%velocity_scale%own, control%accuracy*self%velocity_scale%value)
     do tries = 1, most_tries + 1
-      call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+      call self%refinement%solve(self%problem, self%method, control, share, figures%solve, error, self%exact, watch)
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
-      call self%refinement%go_on(self%problem, self%method, control, self%drift%goal_share(self%velocity_scale%diameter), &
-        & figures%solve, error, watch)
       self%messages = self%messages + self%problem%shared%messages
       self%values = self%values + self%problem%shared%values
       if (allocated(error) .or. figures%solve%status == solve_diverged) return

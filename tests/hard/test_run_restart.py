@@ -138,7 +138,7 @@ class Restart(RunTestCase):
             self.one_restart(case, stop, before, after, straight)
 
     def test_refined(self):
-        """A load that grows on grains that do not give way: solves go on beyond their goal, by how far the scene has come in all steps."""
+        """A load that grows on grains that do not give way: solves aim at less error, by how far the scene has come in all steps."""
         case = {"scene": {"bodies": "column", "column_count": 12, "radius": 0.05, "mass": 0.7, "gravity": [0.0, 0.0]},
                 "boundary": [{"shape": "plane", "name": "lid", "point": [0.0, 1.2], "normal": [0.0, -1.0], "free": [False, True], "mass": 0.7,
                               "table": "../force.csv"}],

@@ -506,6 +506,38 @@ class RigidLimit(ComplianceScene):
             self.assertAlmostEqual(found["/steps/1500/bodies/position"][0, 1], 0.05 - 50.0 * G / 3e5, delta=1e-8)
 
 
+class Loads(ComplianceScene):
+
+    def test_load_on_stiff_springs(self):
+        """At the default accuracy the forces below a load that has come to stay are right, and so is what the springs hold, however stiff they are for the
+        step: errors are compared with what the load does to the springs in a step. A load that swings by a part of it is followed."""
+        count, load, step = 20, 100.0, 1.0 / 1024
+        slow = {"criterion": "velocity_error", "tolerance": 1e-2, "check_every": 10, "warm_start": True}
+        self.step = step
+        for stiffness, swing in ((1e6, 0.0), (1e7, 0.0), (1e8, 0.0), (1e7, 0.05)):
+            column = [Grain([0.0, RADIUS * (2 * k + 1)], radius=RADIUS) for k in range(count)]
+            walls = [plane([0.0, 0.0], [0.0, 1.0], name="base", material="m"),
+                     plane([0.0, 2 * RADIUS * count], [0.0, -1.0], name="push", material="m", free=[False, True], mass=2 * MASS, table="push.csv")]
+            time = np.arange(0, 2049, 16) * step
+            force = load * np.minimum(2.0 * time, 1.0) * (1.0 + swing * np.sin(2 * np.pi * time))
+            table = "time,fy\n" + "\n".join(f"{t!r},{-f!r}" for t, f in zip(time.tolist(), force.tolist())) + "\n"
+            record = self.play(f"load {stiffness:g} {swing:g}", column, walls, (0.0, 0.0), 2048, files={"push.csv": table}, solver=slow, material=MATERIAL,
+                               law=[elastic(normal_stiffness=stiffness, spring_restitution=0.3)], output={"every": 0, "boundary_forces": True, "energy": True})
+            history = record.run.history()
+            late = history["time"] > 1.0
+            wanted = -np.interp(history["time"], time, force)
+            at = f"load on springs of {stiffness:g} N/m, swings by {swing:g}"
+            self.verify(at, "force on the base [N]", history["force_y:base"][late], wanted[late], 0.008 * load)
+            if swing == 0.0:
+                # each contact bears it
+                self.verify(at, "energy of the springs [J]", history["elastic_energy"][late], 0.5 * (count + 1) * load**2 / stiffness,
+                            0.015 * 0.5 * (count + 1) * load**2 / stiffness)
+            # h F/m over 1 + h^2 k/m, the mean over contacts of two disks, one on the base and one under the lid
+            squares = step**2 * stiffness * (2.0 * (count - 1) / MASS + 1.0 / MASS + 1.0 / MASS + 0.5 / MASS) / (count + 1)
+            self.verify(at, "velocity scale [m/s]", history["velocity_scale"][-1], step * load / MASS / (1.0 + squares), 1e-3 * step * load / MASS)
+            self.assertRegex(record.run.stdout, r" m/s: load on springs in \d+ solves")
+
+
 class Invariance(ComplianceScene):
 
     def case(self, dimension, **law):

@@ -1,5 +1,5 @@
-!> Going on with a solve that has reached its goal, to a smaller one, as long as that costs little. Errors within the goal may add
-!> up from step to step where nothing moves (gravier_drift). What a solve leaves of the smaller goal, the next one starts from.
+!> Solves that aim at less error than they have to, as long as that costs little. Errors within the goal may add up from step to
+!> step where nothing moves (gravier_drift). What a solve leaves of the smaller goal, the next one starts from, and it is no failure.
 module gravier_refinement
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -10,113 +10,143 @@ module gravier_refinement
   use gravier_method, only: method_t
   use gravier_backoff, only: backoff_t, backoff_words, backoff_record
   use gravier_solve, only: solve_contacts
-  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_watch_t, by_velocity, solve_converged
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, by_velocity, &
+    & solve_converged, solve_diverged, solve_unbounded
   implicit none
   private
   public :: refinement_t, refinement_words, refinement_record
 
-  !> further iterations that a solve may always take, and times those that it took to its goal
-  integer, parameter :: few_iterations = 200, times_as_many = 2
-  !> share of the goal above which a smaller one is not worth a second solve, and tolerance of the residual that none falls below
-  real(dp), parameter :: worth_it = 0.7_dp, least_tolerance = 1.0e-12_dp
-  !> what is left of the error where going on was of use though the smaller goal was not reached
-  real(dp), parameter :: gained = 0.5_dp
+  !> iterations in which the smaller goal has to be reached, and times that they are doubled where they do not suffice, because loads
+  !> take more from end to end of a high scene
+  integer, parameter :: few_iterations = 200, most_doublings = 3
+  !> share of the goal above which a smaller one is not worth aiming at, and tolerance of the residual that none falls below
+  real(dp), parameter :: worth_it = 0.5_dp, least_tolerance = 1.0e-12_dp
 
   !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
-  integer, parameter :: refinement_words = 1 + backoff_words
-  character(len=*), parameter :: refinement_record = "turns "//backoff_record
+  integer, parameter :: refinement_words = 2 + backoff_words
+  character(len=*), parameter :: refinement_record = "turns doublings "//backoff_record
 
   type :: refinement_t
-    !> since this run began or went on from a checkpoint: solves that went on, those of them that reached the smaller goal, and
-    !> iterations that all of them took for it
-    integer(i8) :: refined = 0, reached = 0, iterations = 0
-    !> the smallest of these goals, over that of the user
+    !> since this run began or went on from a checkpoint: solves that aimed at less error, those of them that came to it, and
+    !> iterations of the others until they gave it up
+    integer(i8) :: refined = 0, reached = 0, in_vain = 0
+    !> the smallest error aimed at, over that of the user
     real(dp) :: least_share = 1.0_dp
-    !> solves that might have gone on, since the first step
+    !> solves that might have aimed at less error, since the first step
     integer, private :: turns = 0
+    !> how often the iterations that they may take were doubled
+    integer, private :: doublings = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
-    procedure :: go_on => refinement_go_on
+    procedure :: solve => refinement_solve
     procedure :: get_state => refinement_get_state
     procedure :: set_state => refinement_set_state
   end type refinement_t
 
 contains
 
-  !> Go on with a solve that has converged, unless too many before it gained nothing by that. Its report is then that of both as of
-  !> one, with the goal of the first. Impulses that became worse are given up. Collective.
-  subroutine refinement_go_on(self, problem, method, control, share, report, error, watch)
+  !> Solve: first to a share of the goal, unless that is hardly smaller or too many solves before did not come to it; then, where
+  !> that has failed, to the goal of the user, from where the first has ended. The report is that of both as of one. Collective.
+  subroutine refinement_solve(self, problem, method, control, share, report, error, exact, watch)
+    class(refinement_t), intent(inout) :: self
+    !> with its velocity scale
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(inout) :: method
+    !> with the goal of the user
+    type(solve_control_t), intent(in) :: control
+    !> of the goal that is aimed at
+    real(dp), intent(in) :: share
+    type(solve_report_t), intent(out) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    !> needed where the criterion is by_error
+    class(exact_solution_t), intent(in), optional :: exact
+    class(solve_watch_t), intent(inout), optional :: watch
+    type(solve_report_t) :: first
+    logical :: aims
+
+    aims = .not. (share > worth_it .or. control%criterion /= by_velocity .or. problem%n_contacts == 0)
+    if (aims) then
+      self%turns = self%turns + 1
+      aims = self%backoff%allows(self%turns)
+    end if
+    if (.not. aims) then
+      call solve_contacts(problem, method, control, report, error, exact, watch)
+      return
+    end if
+    call attempt(self, problem, method, control, share, first, error, watch)
+    if (allocated(error)) return
+    if (first%status == solve_converged) then
+      report = first
+      report%goal = control%accuracy
+      report%violation_allowed = first%violation_allowed/share
+      return
+    end if
+    call solve_contacts(problem, method, control, report, error, exact, watch)
+    if (allocated(error)) return
+    call join(report, first)
+    ! both are one solve
+    method%work%solves = method%work%solves - 1
+  end subroutine refinement_solve
+
+  !> Aim at a share of the goal. Impulses of a solve that found none are those of its start. Collective.
+  subroutine attempt(self, problem, method, control, share, report, error, watch)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
-    !> of the first solve
     type(solve_control_t), intent(in) :: control
-    !> the smaller goal over that of the control
     real(dp), intent(in) :: share
-    !> of the first solve; then of both
-    type(solve_report_t), intent(inout) :: report
+    type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
-    type(kept_impulses_t), allocatable :: kept(:)
+    type(kept_impulses_t) :: kept(size(problem%sub))
     type(solve_control_t) :: further
-    type(solve_report_t) :: second
 
-    if (allocated(error) .or. share > worth_it .or. control%criterion /= by_velocity) return
-    if (report%status /= solve_converged .or. problem%n_contacts == 0) return
-    self%turns = self%turns + 1
-    if (.not. self%backoff%allows(self%turns)) return
     further = control
-    further%layered = .false.
     further%accuracy = share*control%accuracy
     further%tolerance = max(share*control%tolerance, min(control%tolerance, least_tolerance))
-    further%max_iterations = min(control%max_iterations, max(few_iterations, times_as_many*report%iterations))
-    allocate (kept(size(problem%sub)))
+    further%max_iterations = min(control%max_iterations, few_iterations*2**self%doublings)
     call copy_impulses(problem, kept)
-    call solve_contacts(problem, method, further, second, error, watch=watch)
+    call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return
-    ! both are one solve
-    method%work%solves = method%work%solves - 1
     self%refined = self%refined + 1
-    if (second%status == solve_converged) self%reached = self%reached + 1
-    self%iterations = self%iterations + second%iterations
     self%least_share = min(self%least_share, share)
-    call self%backoff%note(self%turns, tried=.true., kept=second%status == solve_converged .or. &
-      & second%figure <= gained*report%figure)
-    if (second%status == solve_converged .or. second%figure <= report%figure) then
-      call take_end(report, second)
+    if (report%status == solve_converged) then
+      self%reached = self%reached + 1
+      if (self%doublings > 0 .and. 4*report%iterations < further%max_iterations) self%doublings = self%doublings - 1
+      call self%backoff%note(self%turns, tried=.true., kept=.true.)
     else
-      ! the figure of a solve that diverged may be NaN
-      call restore_impulses(problem, kept)
-      if (problem%cell%is_driven) call respond(problem)
-      call problem%evaluate()
+      self%in_vain = self%in_vain + report%iterations
+      call self%backoff%note(self%turns, tried=self%doublings == most_doublings, kept=.false.)
+      self%doublings = min(self%doublings + 1, most_doublings)
     end if
-    report%iterations = report%iterations + second%iterations
-    report%seconds = report%seconds + second%seconds
-  end subroutine refinement_go_on
+    if (report%status /= solve_diverged .and. report%status /= solve_unbounded) return
+    call restore_impulses(problem, kept)
+    if (problem%cell%is_driven) call respond(problem)
+    call problem%evaluate()
+  end subroutine attempt
 
-  !> What is known of the velocities at the end of the second solve.
-  pure subroutine take_end(report, second)
-    !> of the first; then of the velocities of the second
+  !> The report of a solve that went on from an attempt, as of both together.
+  pure subroutine join(report, first)
+    !> of the second; then of both
     type(solve_report_t), intent(inout) :: report
-    type(solve_report_t), intent(inout) :: second
+    type(solve_report_t), intent(in) :: first
 
-    report%residual = second%residual
-    report%jump = second%jump
-    report%velocity_error = second%velocity_error
-    report%violation = second%violation
-    report%figure = second%figure
-    if (.not. allocated(report%trace)) return
-    call second%follow_trace(report)
-    report%n_trace = second%n_trace
-    call move_alloc(second%trace, report%trace)
-  end subroutine take_end
+    if (allocated(first%trace)) call report%follow_trace(first)
+    call report%history%follow(first%history, first%iterations)
+    report%iterations = first%iterations + report%iterations
+    report%seconds = first%seconds + report%seconds
+    report%start_seconds = first%start_seconds
+    report%layered = report%layered .or. first%layered
+    report%layered_sweeps = report%layered_sweeps + first%layered_sweeps
+  end subroutine join
 
   pure subroutine refinement_get_state(self, words)
     class(refinement_t), intent(in) :: self
     integer(i8), intent(out) :: words(refinement_words)
 
     words(1) = self%turns
-    call self%backoff%get_state(words(2:))
+    words(2) = self%doublings
+    call self%backoff%get_state(words(3:))
   end subroutine refinement_get_state
 
   pure subroutine refinement_set_state(self, words)
@@ -124,7 +154,8 @@ contains
     integer(i8), intent(in) :: words(refinement_words)
 
     self%turns = narrow(words(1))
-    call self%backoff%set_state(words(2:))
+    self%doublings = narrow(words(2))
+    call self%backoff%set_state(words(3:))
   end subroutine refinement_set_state
 
 end module gravier_refinement

@@ -39,6 +39,8 @@ contains
       call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
       call own%damp(w(1), h, sub%gap(c))
       sub%stiffest = max(sub%stiffest, h*sqrt(spring%stiffness(1)*w(1)))
+      sub%stiffness = sub%stiffness + h**2*spring%stiffness(1)*w(1)
+      sub%n_springs = sub%n_springs + 1
       law(:) = own%law(1, h, sub%gap(c))
       sub%hot(q, row%compliance_n, g) = law(1)
       sub%hot(q, row%shift, g) = law(2)

@@ -6,8 +6,7 @@
 !> and the radius of gyration R of the grains. Its norm is at most the root mean square of v - v_c. Along periodic axes grains have
 !> no place; there the cell may creep, at the velocity gradient times its edges.
 !>
-!> As the longest of these ways grows, solves are asked for less error (gravier_refinement), and the ways end before they can be
-!> seen.
+!> As the longest of these ways grows, solves aim at less error (gravier_refinement), and the ways end before they can be seen.
 module gravier_drift
   use gravier_kinds, only: dp, i8
   use gravier_body_store, only: body_set_t
@@ -20,9 +19,10 @@ module gravier_drift
 
   !> errors of its solve below which the motion of a step is not told from them
   real(dp), parameter :: unresolved_times = 2.0_dp
-  !> Diameters by which a scene may move in such steps before it can be seen. Solves are asked for half of the error for each
-  !> `halving_part` of that, down to the least share of the goal.
-  real(dp), parameter :: most_drift = 0.01_dp, halving_part = 0.05_dp, least_share = 1.0e-4_dp
+  !> Diameters by which a scene may move in such steps before it can be seen. From `free_part` of that on, solves aim at half of the
+  !> error for each `halving_part`, down to the least share of the goal, and to no less than what tells motion from errors.
+  real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.1_dp, halving_part = 0.05_dp, least_share = 1.0e-3_dp, &
+    & least_of_motion = 0.25_dp
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
   integer, parameter :: of_centre = 1, of_spread = 2, of_cell = 3
@@ -194,15 +194,20 @@ contains
     end do
   end function drift_length
 
-  !> The share of its goal that a solve should come to.
-  pure real(dp) function drift_goal_share(self, diameter) result(share)
+  !> The share of its goal that a solve should aim at.
+  pure real(dp) function drift_goal_share(self, diameter, own, goal) result(share)
     class(drift_t), intent(in) :: self
     !> of the mean grain; 0 without grains [m]
     real(dp), intent(in) :: diameter
+    !> root mean square velocity of the bodies in contact before the step, and velocity error that is the goal of its solve [m/s]
+    real(dp), intent(in) :: own, goal
+    real(dp) :: halvings
 
     share = 1.0_dp
-    if (self%steps == 0 .or. .not. diameter > 0.0_dp) return
-    share = max(least_share, 2.0_dp**(-min(self%length()/(halving_part*most_drift*diameter), 64.0_dp)))
+    if (self%steps == 0 .or. .not. (diameter > 0.0_dp .and. goal > 0.0_dp)) return
+    halvings = (self%length()/(most_drift*diameter) - free_part)/halving_part
+    if (.not. halvings > 0.0_dp) return
+    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), least_of_motion*own/goal))
   end function drift_goal_share
 
   pure subroutine drift_get_state(self, words)

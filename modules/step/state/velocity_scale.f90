@@ -13,6 +13,9 @@
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
 !>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
+!>     s      mean over compliant contacts of h^2 k/m, with the stiffness k along the normal and the mass m that bodies have there
+!>            for each other, half of that of one of two equal grains. An error that is a part of what a load does to velocities in
+!>            a step changes forces by s times this part of the load. A load on springs counts 1/(1 + s) times.
 !>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else
 !>            stress; f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
 !> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other. Bonds, and
@@ -51,6 +54,8 @@ module gravier_velocity_scale
   real(dp), parameter :: share_of_bonds = 0.2_dp
   !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
+  !> s from which on the kind of a load names springs
+  real(dp), parameter :: much_stiffer = 0.1_dp
   !> the kinds of U where it is the motion that goes on, and where bonds limit that
   character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
 
@@ -63,8 +68,8 @@ module gravier_velocity_scale
     real(dp) :: diameter = 0.0_dp, mass = 0.0_dp
     !> simulated time [s]; 0: none
     real(dp) :: duration = 0.0_dp
-    !> largest coefficient of restitution of the laws
-    real(dp) :: restitution = 0.0_dp
+    !> largest coefficient of restitution of the laws; s of compliant contacts, 0 without any
+    real(dp) :: restitution = 0.0_dp, stiffness = 0.0_dp
     !> the load is that of attractions, in the place of another one, and holds bodies together
     logical :: internal = .false.
     !> what the mean attraction of a bond that may break for good gives to the mean grain in a step; 0 without bonds [m/s]
@@ -133,8 +138,8 @@ contains
     real(dp), intent(in) :: area(:)
     type(imposed_motion_t) :: motion
     !> squares and number of attractions, of impulses where nothing loads or drives; number, masses and their squares of grains;
-    !> mass, twice the energy and momentum of all bodies
-    real(dp) :: parts(9 + decomposition%nd, size(problem%sub)), sums(9 + decomposition%nd)
+    !> sum of h^2 k/m over compliant contacts and their number; mass, twice the energy and momentum of all bodies
+    real(dp) :: parts(11 + decomposition%nd, size(problem%sub)), sums(11 + decomposition%nd)
     real(dp) :: attraction
     logical :: idle
     integer :: s
@@ -150,8 +155,10 @@ contains
       if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
       if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
       call add_masses(problem%sub(s), parts(5:7, s))
-      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(8:, s))
-      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(8:, s))
+      parts(8, s) = problem%sub(s)%stiffness
+      parts(9, s) = real(problem%sub(s)%n_springs, dp)
+      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(10:, s))
+      call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(10:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     if (decomposition%na > 0) self%load = max(self%load, applied_load(problem))
@@ -165,16 +172,18 @@ contains
     if (attraction > 0.0_dp) self%load = merge(share_of_bonds, 1.0_dp, physics%laws%breaks)*attraction
     self%stress = 0.0_dp
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
+    self%stiffness = 0.0_dp
+    if (sums(9) > 0.0_dp) self%stiffness = sums(8)/sums(9)
     self%own = 0.0_dp
-    if (sums(8) > 0.0_dp) then
+    if (sums(10) > 0.0_dp) then
       ! nothing holds a scene without boundaries: its mean motion is none
-      if (.not. motion%bounded) sums(9) = max(sums(9) - sum(sums(10:)**2)/sums(8), 0.0_dp)
-      self%own = sqrt(sums(9)/sums(8))
+      if (.not. motion%bounded) sums(11) = max(sums(11) - sum(sums(12:)**2)/sums(10), 0.0_dp)
+      self%own = sqrt(sums(11)/sums(10))
     end if
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call self%choose()
-    if (.not. motion%bounded .and. sums(8) > 0.0_dp) motion%common(1:decomposition%nd) = sums(10:)/sums(8)
+    if (.not. motion%bounded .and. sums(10) > 0.0_dp) motion%common(1:decomposition%nd) = sums(12:)/sums(10)
     call set_concerns(self, physics, motion%common, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
@@ -401,22 +410,24 @@ contains
   !> The rule.
   pure subroutine velocity_scale_choose(self)
     class(velocity_scale_t), intent(inout) :: self
-    real(dp) :: slow
+    real(dp) :: slow, load
 
     if (self%given > 0.0_dp) then
       self%value = self%given
       self%kind = "given"
       return
     end if
-    self%value = self%load
+    load = self%load/(1.0_dp + self%stiffness)
+    self%value = load
     self%kind = "load of a step"
+    if (self%stiffness > much_stiffer) self%kind = "load on springs"
     if (.not. self%load > 0.0_dp) self%kind = "none"
     if (.not. (self%load > 0.0_dp .or. self%drive > 0.0_dp) .and. self%own < little_motion*self%stress) then
-      self%value = self%stress
+      self%value = self%stress/(1.0_dp + self%stiffness)
       self%kind = "contact forces"
     end if
     slow = max(self%drive, self%creep)
-    if ((self%drive > 0.0_dp .or. self%internal .and. slow > 0.0_dp) .and. (slow < self%load .or. .not. self%load > 0.0_dp)) then
+    if ((self%drive > 0.0_dp .or. self%internal .and. slow > 0.0_dp) .and. (slow < load .or. .not. load > 0.0_dp)) then
       self%value = slow
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"

@@ -140,21 +140,28 @@ contains
     call sim%free()
   end subroutine test_cell
 
-  !> Half of the error is asked for with each part of the way, down to a least share.
+  !> Beyond a part of the way that is free, half of the error is aimed at with each further part, down to a least share, and to no
+  !> less than a quarter of what moves.
   subroutine test_share()
     type(simulation_t) :: sim
     type(drift_t) :: drift
     real(dp), parameter :: part = 0.05_dp*most_drift*0.2_dp
 
     call make_scene(comm, row//rest, sim)
-    call check_close(drift%goal_share(0.2_dp), 1.0_dp, 0.0_dp, "before the first step")
-    call set_velocities(sim, [0.0_dp, 3.0_dp*part/h], 0.0_dp)
+    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "before the first step")
+    call set_velocities(sim, [0.0_dp, 1.9_dp*part/h], 0.0_dp)
     call note(drift, sim, 0.0_dp)
-    call check_close(drift%goal_share(0.2_dp), 0.125_dp, 1.0e-9_dp, "three parts")
-    call check_close(drift%goal_share(0.0_dp), 1.0_dp, 0.0_dp, "without grains")
+    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "within two parts")
+    call set_velocities(sim, [0.0_dp, 3.1_dp*part/h], 0.0_dp)
+    call note(drift, sim, 0.0_dp)
+    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 0.125_dp, 1.0e-9_dp, "three parts beyond them")
+    call check_close(drift%goal_share(0.0_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "without grains")
+    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 0.0_dp), 1.0_dp, 0.0_dp, "without a scale")
+    call check_close(drift%goal_share(0.2_dp, 1.0_dp, 1.0_dp), 0.25_dp, 0.0_dp, "a quarter of what moves")
+    call check_close(drift%goal_share(0.2_dp, 7.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "no more than the goal")
     call set_velocities(sim, [0.0_dp, 1.0_dp], 0.0_dp)
     call note(drift, sim, 0.0_dp)
-    call check_close(drift%goal_share(0.2_dp), 1.0e-4_dp, 0.0_dp, "the least share")
+    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0e-3_dp, 0.0_dp, "the least share")
     call sim%free()
   end subroutine test_share
 

@@ -1,4 +1,5 @@
-!> Solves that go on beyond their goal: when they do, how far, and whose impulses and figures are left.
+!> Solves that aim at less error than they have to: when they do, in how many iterations, and what is left where they do not come
+!> to it.
 program test_refinement
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -6,7 +7,7 @@ program test_refinement
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_method, only: method_t
   use gravier_nlgs, only: nlgs_t
-  use gravier_solve_report, only: solve_control_t, solve_report_t, by_velocity, by_residual, solve_converged, solve_stagnated
+  use gravier_solve_report, only: solve_control_t, solve_report_t, by_velocity, by_residual, solve_converged, solve_exhausted
   use gravier_refinement, only: refinement_t, refinement_words
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_test_simulations, only: make_scene
@@ -14,15 +15,13 @@ program test_refinement
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   type(communicator_t), target :: comm
-  !> iterations of the first solve, and its velocity error [m/s]
-  integer, parameter :: before = 3
-  real(dp), parameter :: error_before = 0.7_dp
 
   call start_parallel()
   call comm%init()
   call test_success()
-  call test_not_gone_on()
-  call test_worse()
+  call test_plain()
+  call test_in_vain()
+  call test_diverged()
   call test_limits()
   call test_pauses()
   call test_trace()
@@ -32,12 +31,11 @@ program test_refinement
 
 contains
 
-  !> A column of two unit grains under unit gravity with impulses of 0.6 and 0.3 of the exact ones, the velocity scale 1, and the
-  !> report of a solve that has converged there.
-  subroutine prepare(sim, control, report)
+  !> A column of two unit grains under unit gravity with impulses of 0.6 and 0.3 of the exact ones, the velocity scale 1, and a goal
+  !> that they are within.
+  subroutine prepare(sim, control)
     type(simulation_t), intent(inout) :: sim
     type(solve_control_t), intent(out) :: control
-    type(solve_report_t), intent(out) :: report
     type(step_figures_t) :: figures
     integer :: c
 
@@ -49,17 +47,9 @@ contains
     end do
     call sim%problem%evaluate()
     control%criterion = by_velocity
-    control%accuracy = 0.8_dp
-    control%tolerance = 0.5_dp
-    control%max_iterations = 500
-    report%status = solve_converged
-    report%iterations = before
-    report%seconds = 3.0_dp
-    report%velocity_error = error_before
-    report%figure = 0.7_dp
-    report%goal = control%accuracy
-    report%figure_ratio = 5.0_dp
-    report%history%first = [3, 2, 1]
+    control%accuracy = 1.0e4_dp
+    control%tolerance = 1.0e2_dp
+    control%layered = .false.
   end subroutine prepare
 
   !> The impulse of the ground [N s].
@@ -73,7 +63,7 @@ contains
     end do
   end function on_ground
 
-  !> The smaller goal is reached: impulses, errors and iterations are those of the end, the goal is that of the user.
+  !> The smaller goal is reached: the report is of one solve with the goal of the user.
   subroutine test_success()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
@@ -82,28 +72,26 @@ contains
     class(method_t), allocatable :: method
     type(error_t), allocatable :: error
 
-    call prepare(sim, control, report)
+    call prepare(sim, control)
     allocate (nlgs_t :: method)
-    call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
     call check(.not. allocated(error), "no error")
     call check_close(on_ground(sim), 2.0_dp, 1.0e-5_dp, "the ground carries both")
     call check_equal(report%status, solve_converged, "it has converged")
-    call check(report%iterations > before, "iterations of both")
-    call check_equal(int(refinement%iterations), report%iterations - before, "further iterations")
-    call check_equal(int(refinement%refined), 1, "solves that went on")
-    call check_equal(int(refinement%reached), 1, "solves that came to what they aimed at")
-    call check_close(refinement%least_share, 1.0e-6_dp, 0.0_dp, "what they aimed at")
-    call check(report%velocity_error < 1.0e-5_dp, "the velocity error of the end")
-    call check(report%residual < 1.0e-5_dp .and. report%figure < 1.0e-5_dp, "residual and figure of the end")
-    call check(report%seconds > 3.0_dp, "seconds of both")
-    call check_close(report%goal, 0.8_dp, 0.0_dp, "the goal of the user")
-    call check_close(report%figure_ratio, 5.0_dp, 0.0_dp, "what the first tells the next solve")
-    call check_equal(report%history%first(0), 3, "the first reached its goal where it did")
+    call check(report%iterations > 0, "iterations")
+    call check_equal(int(method%work%solves), 1, "one solve")
+    call check_equal(int(refinement%refined), 1, "solves that aimed at less error")
+    call check_equal(int(refinement%reached), 1, "solves that came to it")
+    call check_equal(int(refinement%in_vain), 0, "no iterations in vain")
+    call check_close(refinement%least_share, 1.0e-10_dp, 0.0_dp, "what they aimed at")
+    call check(report%velocity_error < 1.0e-5_dp .and. report%figure < 1.0e-5_dp, "error and figure of the end")
+    call check_close(report%goal, 1.0e4_dp, 0.0_dp, "the goal of the user")
+    call check_close(report%violation_allowed, 5.0e4_dp, 1.0e-3_dp, "and what it allows of a contact")
     call sim%free()
   end subroutine test_success
 
-  !> A goal that is hardly smaller, another criterion and a solve that missed its own are left alone.
-  subroutine test_not_gone_on()
+  !> A goal that is hardly smaller, and another criterion: solves are as without.
+  subroutine test_plain()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
     type(solve_report_t) :: report
@@ -111,22 +99,40 @@ contains
     class(method_t), allocatable :: method
     type(error_t), allocatable :: error
 
-    call prepare(sim, control, report)
+    call prepare(sim, control)
     allocate (nlgs_t :: method)
-    call refinement%go_on(sim%problem, method, control, 0.9_dp, report, error)
-    report%status = solve_stagnated
-    call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-    report%status = solve_converged
+    call refinement%solve(sim%problem, method, control, 0.6_dp, report, error)
     control%criterion = by_residual
-    call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-    call check_equal(int(refinement%refined), 0, "none went on")
-    call check_equal(report%iterations, before, "no iterations were made")
-    call check_close(on_ground(sim), 1.2_dp, 0.0_dp, "the impulses are those of the first")
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call check_equal(int(refinement%refined), 0, "none aimed at less error")
+    call check_close(on_ground(sim), 1.2_dp, 0.0_dp, "the impulses were good enough")
     call sim%free()
-  end subroutine test_not_gone_on
+  end subroutine test_plain
 
-  !> Impulses that became worse are given up.
-  subroutine test_worse()
+  !> A smaller goal that is not reached: the solve goes on to that of the user, and both are one.
+  subroutine test_in_vain()
+    type(simulation_t) :: sim
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(refinement_t) :: refinement
+    class(method_t), allocatable :: method
+    type(error_t), allocatable :: error
+
+    call prepare(sim, control)
+    allocate (method, source=scaling_t(factor=1.001_dp))
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call check_equal(report%status, solve_converged, "in vain: it has converged")
+    call check(report%iterations >= 200, "in vain: iterations of both")
+    call check_close(on_ground(sim), 1.2_dp*1.001_dp**report%iterations, 1.0e-10_dp, "in vain: impulses of the end")
+    call check_equal(int(method%work%solves), 1, "in vain: one solve")
+    call check_equal(int(refinement%refined), 1, "in vain: aimed at")
+    call check_equal(int(refinement%reached), 0, "in vain: not reached")
+    call check_equal(int(refinement%in_vain), 200, "in vain: iterations until it was given up")
+    call sim%free()
+  end subroutine test_in_vain
+
+  !> Impulses that grow beyond bounds are given up, and so are those of a problem without a solution.
+  subroutine test_diverged()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
     type(solve_report_t) :: report
@@ -135,45 +141,54 @@ contains
     type(error_t), allocatable :: error
     real(dp) :: speed
 
-    call prepare(sim, control, report)
+    call prepare(sim, control)
     speed = sim%problem%sub(1)%v_global(2, 1)
-    allocate (method, source=scaling_t(factor=3.0_dp))
-    call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-    call check_equal(report%status, solve_converged, "worse: the solve has converged")
-    call check_close(on_ground(sim), 1.2_dp, 0.0_dp, "worse: impulses of the first")
-    call check_close(sim%problem%sub(1)%v_global(2, 1), speed, 0.0_dp, "worse: velocities of the first")
-    call check_close(report%velocity_error, error_before, 0.0_dp, "worse: error of the first")
-    call check(report%iterations > before, "worse: iterations of both")
-    call check_equal(int(refinement%reached), 0, "worse: not reached")
+    allocate (method, source=scaling_t(factor=1.0e30_dp))
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call check(report%status == solve_converged .or. report%status == solve_exhausted, "diverged: it begins anew")
+    call check_equal(int(refinement%reached), 0, "diverged: not reached")
+    if (report%status == solve_converged) then
+      call check_close(on_ground(sim), 1.2_dp, 0.0_dp, "diverged: impulses of the start")
+      call check_close(sim%problem%sub(1)%v_global(2, 1), speed, 0.0_dp, "diverged: velocities of the start")
+    end if
     call sim%free()
-  end subroutine test_worse
+  end subroutine test_diverged
 
-  !> Two hundred iterations, or twice those of the first solve, and no more than all solves may take.
+  !> Two hundred iterations, twice as many after each attempt in vain, up to 1600, and no more than all solves may take. One that
+  !> needs less than a quarter halves them again.
   subroutine test_limits()
-    integer, parameter :: made(*) = [3, 300, 3], most(*) = [5000, 5000, 50], further(*) = [200, 600, 50]
     type(simulation_t) :: sim
     type(solve_control_t) :: control
     type(solve_report_t) :: report
     type(refinement_t) :: refinement
-    class(method_t), allocatable :: method
+    class(method_t), allocatable :: method, solver
     type(error_t), allocatable :: error
-    integer :: k
+    integer(i8) :: words(refinement_words)
+    integer, parameter :: further(*) = [200, 400, 800, 1600, 1600]
+    integer :: k, before
 
-    do k = 1, size(made)
-      call prepare(sim, control, report)
-      control%max_iterations = most(k)
-      report%iterations = made(k)
-      if (allocated(method)) deallocate (method)
-      ! the impulses stay as they are
-      allocate (method, source=scaling_t(factor=1.0_dp))
-      call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-      call check_equal(report%iterations - made(k), further(k), "further iterations")
-      call sim%free()
+    call prepare(sim, control)
+    ! the impulses stay as they are
+    allocate (method, source=scaling_t(factor=1.0_dp))
+    do k = 1, size(further)
+      before = int(refinement%in_vain)
+      call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+      call check_equal(int(refinement%in_vain) - before, further(k), "iterations of an attempt")
     end do
+    control%max_iterations = 50
+    before = int(refinement%in_vain)
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call check_equal(int(refinement%in_vain) - before, 50, "the limit of all solves")
+    control%max_iterations = 5000
+    allocate (nlgs_t :: solver)
+    call refinement%solve(sim%problem, solver, control, 1.0e-10_dp, report, error)
+    call refinement%get_state(words)
+    call check_equal(int(words(2)), 2, "fewer after one that needs few")
+    call sim%free()
   end subroutine test_limits
 
-  !> After five solves that went on in vain two are left alone, also by a run that goes on from a checkpoint; those that came nearer,
-  !> by half of their error, are not in vain.
+  !> After five attempts in vain with as many iterations as there may be, two solves are left alone, also by a run that goes on from
+  !> a checkpoint.
   subroutine test_pauses()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
@@ -184,28 +199,23 @@ contains
     integer(i8) :: words(refinement_words)
     integer :: k
 
-    call prepare(sim, control, report)
+    call prepare(sim, control)
     control%max_iterations = 2
     allocate (method, source=scaling_t(factor=1.0_dp))
-    do k = 1, 6
-      report%figure = 10.0_dp
-      call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
+    do k = 1, 9
+      call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
     end do
-    call check_equal(int(refinement%refined), 6, "figures that fell by half")
-    do k = 1, 6
-      call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-    end do
-    call check_equal(int(refinement%refined), 11, "solves that went on in vain before a pause")
+    call check_equal(int(refinement%refined), 8, "attempts in vain before a pause")
     call refinement%get_state(words)
     call again%set_state(words)
     do k = 1, 2
-      call again%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
+      call again%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
       call check_equal(int(again%refined), k - 1, "the next one is left alone too, after a restart")
     end do
     call sim%free()
   end subroutine test_pauses
 
-  !> The checks of both in one trace.
+  !> The checks of both in one trace, whose iterations and seconds go on.
   subroutine test_trace()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
@@ -213,19 +223,18 @@ contains
     type(refinement_t) :: refinement
     class(method_t), allocatable :: method
     type(error_t), allocatable :: error
+    integer :: k
 
-    call prepare(sim, control, report)
+    call prepare(sim, control)
     control%trace = .true.
-    allocate (report%trace(6, 8), source=0.0_dp)
-    report%n_trace = 2
-    report%trace(1, 1:2) = [0.0_dp, 3.0_dp]
-    allocate (nlgs_t :: method)
-    call refinement%go_on(sim%problem, method, control, 1.0e-6_dp, report, error)
-    call check(report%n_trace > 3, "checks of both")
-    call check_close(report%trace(1, 2), 3.0_dp, 0.0_dp, "the last one of the first")
-    call check_close(report%trace(1, 3), 3.0_dp, 0.0_dp, "the second begins there")
-    call check_close(report%trace(1, report%n_trace), real(report%iterations, dp), 0.0_dp, "the last one of the second")
-    call check(report%trace(6, 3) >= 3.0_dp, "seconds go on")
+    allocate (method, source=scaling_t(factor=1.0_dp))
+    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call check(report%n_trace > 20, "checks of both")
+    call check_close(report%trace(1, 1), 0.0_dp, 0.0_dp, "the first one")
+    call check(report%trace(1, report%n_trace) >= 200.0_dp, "those of the second go on")
+    do k = 2, report%n_trace
+      call check(report%trace(1, k) >= report%trace(1, k - 1) .and. report%trace(6, k) >= report%trace(6, k - 1), "none goes back")
+    end do
     call sim%free()
   end subroutine test_trace
 
