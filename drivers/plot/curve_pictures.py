@@ -1,4 +1,4 @@
-"""Curves: panels of history.csv against time, convergence of a solve, profiles of means over the bins of a region."""
+"""Curves: panels of history.csv against time or another column, convergence of a solve, profiles of means over the bins of a region."""
 import re
 
 import matplotlib.pyplot as plt
@@ -14,7 +14,7 @@ TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
 STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
-UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"wall_seconds|solve_seconds", "s"),
+UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s")]
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
@@ -121,31 +121,32 @@ class Panel:
         legend_above(axes)
 
 
-def draw_panels(panels, width=6.2, height=1.75):
-    """A figure of panels one under the other, against time."""
+def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
+    """A figure of panels one under the other, against time or what else is `along` them."""
     high = [height + 0.22 * any(name for _, _, name in panel.curves) for panel in panels]
     figure, places = plt.subplots(len(panels), 1, figsize=(width, 0.4 + sum(high)), sharex=True, squeeze=False, constrained_layout=True)
     for axes, panel in zip(places[:, 0], panels):
         panel.draw(axes)
-    places[-1, 0].set_xlabel("time [s]")
+    places[-1, 0].set_xlabel(along)
     figure.align_ylabels(places[:, 0])
     return figure
 
 
-def draw_history(runs, columns):
-    """A figure with a panel for each column of history.csv against time, a line a run."""
+def draw_history(runs, columns, against="time"):
+    """A figure with a panel for each column of history.csv against time or another column, a line a run."""
     histories = [run.history() for run in runs]
     for run, history in zip(runs, histories):
         if len(history) == 0:
             raise PictureError(f"{run.directory}/history.csv: no step; expected one at least")
-        for name in columns:
+        for name in [*columns, against]:
             if name not in history:
                 raise PictureError(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
     names = names_of(runs) if len(runs) > 1 else [None]
-    panels = [Panel(label_of_all(column, [run.dimension for run in runs]), [(history.time, history[column], name if k == 0 else None)
-                                                          for name, history in zip(names, histories)], counts=column == "iterations")
+    dimensions = [run.dimension for run in runs]
+    panels = [Panel(label_of_all(column, dimensions), [(history[against], history[column], name if k == 0 else None)
+                                                       for name, history in zip(names, histories)], counts=column == "iterations")
               for k, column in enumerate(columns)]
-    return draw_panels(panels)
+    return draw_panels(panels, along=label_of_all(against, dimensions))
 
 
 def velocity_scale(run, step):

@@ -60,12 +60,15 @@ def parse(arguments):
     look.add_argument("--regions", action="store_true", help="outlines of the groups &region, with their bins, and &insertion")
     look.add_argument("--view", type=float, nargs=2, metavar=("AZIMUTH", "ELEVATION"),
                       help="where the eye is in 3D, degrees (-60 20)")
+    look.add_argument("--box", type=float, nargs="+", metavar=("X0", "X1"),
+                      help="draw what is in the box X0 X1 Y0 Y1 Z0 Z1 alone: a part of a scene, or a slice of it")
     look.add_argument("--size", type=float, default=6.2, metavar="INCHES", help="longer side of the box (6.2)")
     packing = kinds.add_parser("packing", parents=[one, look], help="bodies, boundaries and force chains of a step")
     packing.add_argument("--step", type=int, metavar="N", help="a step that results.h5 holds; the last one unless told")
     packing.add_argument("--dpi", type=int, default=200, metavar="N", help="of a PNG (200)")
-    history = kinds.add_parser("history", parents=[several], help="columns of history.csv against time")
+    history = kinds.add_parser("history", parents=[several], help="columns of history.csv against time or another column")
     history.add_argument("--columns", default="iterations,residual,kinetic_energy", metavar="A,B", help="%(default)s unless told")
+    history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain")
     convergence = kinds.add_parser("convergence", parents=[several], help="residual and jump of a solve (&output trace = .true.)")
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")
@@ -86,6 +89,8 @@ def check(options):
     if options.kind in ("packing", "movie"):
         if not 0.0 < options.size <= 1000.0:
             refuse(f"--size {options.size:g}: expected a size above 0, 1000 at most")
+        if options.box and not numpy.isfinite(options.box).all():
+            refuse(f"--box {' '.join(f'{number:g}' for number in options.box)}: expected numbers")
         if options.view and not numpy.isfinite(options.view).all():
             refuse(f"--view {options.view[0]:g} {options.view[1]:g}: expected two numbers")
     if options.kind == "packing" and not 1 <= options.dpi <= 10000:
@@ -117,7 +122,7 @@ def draw(options):
     elif options.kind == "movie":
         draw_movie(runs[0], options)
     elif options.kind == "history":
-        save(draw_history(runs, options.columns.split(",")), out)
+        save(draw_history(runs, options.columns.split(","), options.against), out)
     elif options.kind == "profile":
         save(draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean), out)
     else:

@@ -45,9 +45,27 @@ def quantity(run, step, bodies, kind):
     return numpy.linalg.norm(bodies.velocity, axis=1), "m/s", "speed"
 
 
-def spread(values, kind):
-    """Least and largest value of the colours: a few extreme bodies must not make all others look alike."""
-    top = numpy.quantile(numpy.abs(values), 0.98) or numpy.abs(values).max() or 1.0
+def error_speeds(run):
+    """Speeds that are not told from errors of the solve of a step, its accuracy times U [m/s]: {step: speed}."""
+    if isinstance(run, gravier.BodiesFile):
+        return {}
+    history = run.history()
+    if "velocity_scale" not in history:
+        return {}
+    accuracy = run.case.get("solver", [{}])[0].get("accuracy", 0.1)
+    return dict(zip(history.step.astype(int), accuracy * history.velocity_scale))
+
+
+def least_colour(kind, speed, bodies):
+    """What colours tell apart at least: bodies at rest must not be coloured by rounding."""
+    if kind == "speed" or kind.startswith("velocity_"):
+        return speed
+    return speed / bodies.radius.mean() if kind == "rotation" else 0.0
+
+
+def spread(values, kind, least=0.0):
+    """Least and largest value of the colours: a few extreme bodies must not make all others look alike, nor colours end below `least`."""
+    top = max(numpy.quantile(numpy.abs(values), 0.98), least) or numpy.abs(values).max() or 1.0
     if values.min() < 0.0 or kind.startswith("velocity_"):
         return -top, top
     return (values.min(), top) if kind == "radius" and values.min() < top else (0.0, top)
@@ -67,16 +85,17 @@ def kinds(run, step, bodies, kind):
     return values, named + [str(number) for number in range(len(named) + 1, values.max() + 1)]
 
 
-def colours(run, step, bodies, kind, limits=None):
-    """Values to colour bodies by, their label, and how: a dictionary for a collection; values None for no colour. `limits` are those of
-    the colours where several pictures share them."""
+def colours(run, step, bodies, kind, limits=None, seen=slice(None)):
+    """Values to colour the bodies by that are seen, their label, and how: a dictionary for a collection; values None for no colour. `limits`
+    are those of the colours where several pictures share them."""
     if kind in KINDS:
         values, names = kinds(run, step, bodies, kind)
-        return values, kind, colours_of_kinds(len(names))
+        return values[seen], kind, colours_of_kinds(len(names))
     values, unit, name = quantity(run, step, bodies, kind)
     if values is None:
         return None, None, {}
-    low, top = limits or spread(values, kind)
+    values = values[seen]
+    low, top = limits or spread(values, kind, least_colour(kind, error_speeds(run).get(step, 0.0), bodies))
     power, unit = scaled(top, unit)
     norm = plt.Normalize(low / 10.0**power, top / 10.0**power)
     return values / 10.0**power, f"{name} [{unit}]", {"cmap": plt.get_cmap(TURNS if low < 0.0 else SPEEDS), "norm": norm}
@@ -160,10 +179,13 @@ def shaded_spheres(place, diameter, values, style, axes):
                              facecolors=numpy.stack([face, light], axis=1).reshape(-1, 4), edgecolors=edge, **style)
 
 
-def draw_chains(axes, run, step, view, force):
+def draw_chains(axes, run, step, view, force, box=None):
     """Force chains: a segment for each loaded contact, as thick as its normal force, in another colour where it pulls; `force` is that of
-    the thickest."""
+    the thickest. With a box (low, high), those that begin or end in it."""
     segments, normal = run.chains(step)
+    if box is not None:
+        inside = numpy.all((segments >= box[0]) & (segments <= box[1]), axis=2).any(axis=1)
+        segments, normal = segments[inside], normal[inside]
     top = force or numpy.abs(normal).max(initial=0.0)
     for sign, colour, what in ((1.0, CHAINS, "normal force"), (-1.0, PULLS, "pull")):
         loaded = sign * normal > FAINTEST * top
@@ -197,36 +219,67 @@ class Frame:
         self.low, self.high, self.limits, self.force = low, high, limits, force
 
 
-def title_of(run, step, bodies, contacts, flat):
+def title_of(run, step, bodies, contacts, seen):
+    """What is drawn: where and when, and how many bodies; `seen` (n) tells which of them, None for all."""
     title = run.path.name if isinstance(run, gravier.BodiesFile) else f"step {step}, t = {run.time(step):.4g} s"
-    title += f": {len(bodies)} {'bodies' if shaped(bodies) else 'disks' if flat else 'spheres'}"
-    return title if contacts is None else f"{title}, {len(contacts)} contacts"
+    part = "" if seen is None else f"{numpy.count_nonzero(seen)} of "
+    title += f": {part}{len(bodies)} {'bodies' if shaped(bodies) else 'disks' if run.dimension == 2 else 'spheres'}"
+    return title if contacts is None or part else f"{title}, {len(contacts)} contacts"
+
+
+def asked_box(run, numbers):
+    """Lower and upper corner of the box that a picture is asked for; None for all there is."""
+    if numbers is None:
+        return None
+    if len(numbers) != 2 * run.dimension or not all(low < high for low, high in zip(numbers[::2], numbers[1::2])):
+        raise PictureError(f"--box {' '.join(f'{number:g}' for number in numbers)}: expected {2 * run.dimension} numbers, "
+                           f"{'X0 X1 Y0 Y1 Z0 Z1'[:6 * run.dimension - 1]}, the lower one of each two first")
+    return numpy.array(numbers[::2]), numpy.array(numbers[1::2])
+
+
+def bodies_in(bodies, box):
+    """Which bodies a picture of a box has (n): in the plane those that reach into it, in space those whose centres are in it."""
+    reach = bodies.radius[:, None] if len(box[0]) == 2 else 0.0
+    return numpy.all((bodies.position >= box[0] - reach) & (bodies.position <= box[1] + reach), axis=1)
 
 
 def draw_packing(run, step, options, frame=None):
-    """A figure of one step: bodies by colour, walls, force chains by normal force; `options` has size, view, colour, chains and
-    regions."""
+    """A figure of one step: bodies by colour, walls, force chains by normal force; `options` has size, view, colour, chains, regions
+    and box."""
     frame = frame or Frame()
     step = run.find_step(step)
     bodies, contacts = run.bodies(step), run.contacts(step)
     if len(bodies) == 0:
         raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
-    view, walls = View(run.dimension, *options.view or VIEW), Walls(run, step)
-    box = box_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
+    view, walls, part = View(run.dimension, *options.view or VIEW), Walls(run, step), asked_box(run, options.box)
+    seen = None if part is None else bodies_in(bodies, part)
+    if part is not None:
+        box = part
+        walls.keep(*part)
+    else:
+        box = box_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
+    if seen is not None and not seen.any() and frame.low is None:
+        raise PictureError(f"{run.path}: no body in this --box; expected one at least of those from {numpy.array2string(bodies.position.min(axis=0), precision=4)} "
+                           f"to {numpy.array2string(bodies.position.max(axis=0), precision=4)}")
     low, high = view.extent(*box)
     size = (high - low) / (high - low).max()
     figure, axes = plt.subplots(figsize=(options.size * size[0] + 1.3, options.size * size[1] + 0.9))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
 
-    values, label, how = colours(run, step, bodies, options.colour, frame.limits)
+    values, label, how = colours(run, step, bodies, options.colour, frame.limits, slice(None) if seen is None else seen)
+    outlines = run.outlines(step) if shaped(bodies) else None
+    drawn = bodies
+    if seen is not None:
+        drawn = gravier.Table({name: rows[seen] for name, rows in bodies.items()})
+        outlines = None if outlines is None else [outline for outline, is_seen in zip(outlines, seen) if is_seen]
     chains = options.chains and contacts is not None and len(contacts) > 0
     through = 0.25 if chains and not view.flat else 1.0
     # an outline would hide a body of a few points
     points = 72.0 * options.size / (high - low).max() * numpy.median(2.0 * bodies.radius)
     style = {"edgecolors": "0.55" if view.flat else "0.25", "linewidths": min(0.4, 0.06 * points), "alpha": through, **how}
-    draw_bodies(axes, view, bodies, run.outlines(step) if shaped(bodies) else None, values, style)
+    draw_bodies(axes, view, drawn, outlines, values, style)
     if chains:
-        draw_chains(axes, run, step, view, frame.force)
+        draw_chains(axes, run, step, view, frame.force, part)
     if view.flat:
         axes.plot(*cell_corners(run, step).T, color="0.35", linewidth=0.9, linestyle="--", zorder=1)
         draw_flat_walls(axes, walls, low, high)
@@ -238,8 +291,8 @@ def draw_packing(run, step, options, frame=None):
         axes.set_axis_off()
     if options.regions:
         draw_regions(axes, run, step, view, *box_around(bodies, walls))
-    axes.set_title(title_of(run, step, bodies, contacts, view.flat), fontsize=9, loc="left", pad=18 if options.chains else 6)
-    if values is not None:
+    axes.set_title(title_of(run, step, bodies, contacts, seen), fontsize=9, loc="left", pad=18 if options.chains else 6)
+    if values is not None and len(values) > 0:
         add_legend(figure, axes, values, label, how, kinds(run, step, bodies, options.colour)[1] if options.colour in KINDS else None)
     return figure
 
@@ -248,15 +301,18 @@ def draw_packing(run, step, options, frame=None):
 
 def shared_frame(run, steps, options):
     """Box, colours and forces that hold for all steps of a movie."""
-    lows, highs, limits, force = [], [], [], 0.0
+    lows, highs, limits, force, errors = [], [], [], 0.0, error_speeds(run)
+    part = asked_box(run, options.box)
     for step in steps:
         bodies = run.bodies(step)
         low, high = box_around(bodies, Walls(run, step), points_of(run, step, options))
         lows.append(low)
         highs.append(high)
         values = None if options.colour in KINDS else quantity(run, step, bodies, options.colour)[0]
+        if values is not None and part is not None:
+            values = values[bodies_in(bodies, part)]
         if values is not None and values.any():
-            limits.append(spread(values, options.colour))
+            limits.append(spread(values, options.colour, least_colour(options.colour, errors.get(step, 0.0), bodies)))
         if options.chains and run.contacts(step) is not None:
             force = max(force, numpy.abs(run.chains(step)[1]).max(initial=0.0))
     if not lows:

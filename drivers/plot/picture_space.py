@@ -53,6 +53,11 @@ class Walls:
         if facets is not None:
             self.facets = facets.corners[numpy.isin(facets.boundary, self.rows.id)]
 
+    def keep(self, low, high):
+        """Leave out facets that are outside of a box."""
+        ends = self.facets.min(axis=1), self.facets.max(axis=1)
+        self.facets = self.facets[numpy.all((ends[1] >= low) & (ends[0] <= high), axis=1)]
+
     def planes(self):
         """Points and normals (n, d)."""
         chosen = self.rows.shape == "plane"

@@ -117,7 +117,7 @@ def states(run, colour="speed"):
     steps = [step for step in run.steps if len(run.bodies(step)) > 0]
     if not steps:
         return [], "No written state has a body."
-    options = SimpleNamespace(view=None, size=5.0, colour=colour, chains=run.dimension == 2, regions=False)
+    options = SimpleNamespace(view=None, size=5.0, colour=colour, chains=run.dimension == 2, regions=False, box=None)
     chosen = sorted({steps[0], steps[-1]})
     try:
         frame = shared_frame(run, chosen, options)

@@ -29,7 +29,7 @@ SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, grains=6000, aspects=(0.
                         flat=1.7, tall=1.7, settling=0.3, falls=4.0, bin=1.0, alert=2.0e-3, name="study_collapse_3d",
                         solver={"tolerance": 2.0e-3, "max_iterations": 200, "acceleration": "momentum"})
 #: of the quick form
-QUICK = {2: {"grains": 700, "aspects": (0.5, 1.1, 5.0, 10.0), "falls": 4.0},
+QUICK = {2: {"grains": 700, "aspects": (0.5, 0.75, 1.1, 1.6, 5.0, 10.0), "falls": 4.0},
          3: {"grains": 1500, "aspects": (0.5, 0.8, 1.1, 3.0), "falls": 3.0, "settling": 0.25}}
 # published laws: exponent and range of the factor. In 2D the factors of experiments with sand (Lube) and of disks by contact
 # dynamics (Staron and Hinch) are far apart. In 3D those of Lube are of columns hundreds of grains wide; narrow columns run less far

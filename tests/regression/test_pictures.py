@@ -137,7 +137,7 @@ class Pictures(RunTestCase):
         cls.disks, cls.cylinder = gravier.Run(cls.here(cls, "disks/results")), gravier.Run(cls.here(cls, "cylinder/results"))
 
     def options(self, **changes):
-        return types.SimpleNamespace(**{"view": (-60.0, 20.0), "size": 5.0, "colour": "speed", "chains": False, "regions": False, **changes})
+        return types.SimpleNamespace(**{"view": (-60.0, 20.0), "size": 5.0, "colour": "speed", "chains": False, "regions": False, "box": None, **changes})
 
     def boxes(self, figure, things):
         """Where things are on the picture, in points: (left, bottom, right, top) each."""
@@ -184,6 +184,65 @@ class Pictures(RunTestCase):
         bar = figure.axes[0].child_axes[0]
         # each band of the bar has its name, also where no body has the material
         self.assertEqual([text.get_text() for text in bar.get_yticklabels()], ["sand", "plate"])
+        plt.close(figure)
+
+    def test_at_rest(self):
+        """Colours end at speeds that are told from errors of the solve: bodies at rest are not coloured by rounding."""
+        bodies, scale = self.disks.bodies(150), self.disks.history().velocity_scale[-1]
+        rest = gravier.Table({**bodies, "velocity": 1e-18 * np.arange(bodies.velocity.size).reshape(bodies.velocity.shape), "spin": 1e-18 * bodies.spin})
+        for kind, top in (("speed", 0.1 * scale), ("velocity_y", 0.1 * scale), ("rotation", 0.1 * scale / bodies.radius.mean())):
+            values, label, how = packing_picture.colours(self.disks, 150, rest, kind)
+            power = 1.0 if "10^" not in label else 10.0**int(label.split("{")[1].split("}")[0])
+            self.assertAlmostEqual(how["norm"].vmax * power / top, 1.0, 12, kind)
+            self.assertLess(np.abs(values).max() * power, 1e-12)
+        faster = packing_picture.spread(np.linalg.norm(self.disks.bodies(50).velocity, axis=1), "speed", 0.1 * scale)
+        self.assertGreater(faster[1], scale)
+
+    def test_part(self):
+        """A box shows the bodies that reach into it, of a 3D scene a slice of those whose centres are in it, and colours fit these."""
+        bodies = self.disks.bodies()
+        middle = np.median(bodies.position, axis=0)
+        numbers = [middle[0] - 0.02, middle[0] + 0.02, middle[1] - 0.02, middle[1] + 0.02]
+        figure = packing_picture.draw_packing(self.disks, None, self.options(box=numbers, chains=True))
+        reach = bodies.radius[:, None]
+        inside = np.all((bodies.position + reach >= middle - 0.02) & (bodies.position - reach <= middle + 0.02), axis=1)
+        drawn = next(one for one in figure.axes[0].collections if isinstance(one, matplotlib.collections.EllipseCollection))
+        np.testing.assert_array_equal(drawn.get_offsets(), bodies.position[inside])
+        self.assertTrue(3 < inside.sum() < len(bodies) / 2)
+        self.assertIn(f"{inside.sum()} of 36 disks", figure.axes[0].get_title(loc="left"))
+        self.assertLess(np.ptp(figure.axes[0].get_xlim()), 0.05)
+        segments = np.concatenate([one.get_segments() for one in figure.axes[0].collections if isinstance(one, matplotlib.collections.LineCollection)
+                                   and len(one.get_segments()) > 0])
+        self.assertTrue(np.all(np.min(np.linalg.norm(segments - middle, axis=2), axis=1) < 0.03))
+        plt.close(figure)
+        slice_of = [-0.1, 0.1, 0.0, 0.06, -0.1, -0.05]
+        figure = packing_picture.draw_packing(self.cylinder, None, self.options(box=slice_of))
+        self.assertIn("1 of 2 spheres", figure.axes[0].get_title(loc="left"))
+        plt.close(figure)
+        for run, box, words in ((self.disks, [0, 1, 0], "--box 0 1 0: expected 4 numbers, X0 X1 Y0 Y1, the lower one of each two first"),
+                                (self.disks, [1, 0, 0, 1], "--box 1 0 0 1: expected 4 numbers"),
+                                (self.cylinder, [0, 1, 0, 1], "--box 0 1 0 1: expected 6 numbers, X0 X1 Y0 Y1 Z0 Z1"),
+                                (self.disks, [7, 8, 7, 8], "no body in this --box; expected one at least of those from")):
+            with self.assertRaisesRegex(PictureError, words):
+                packing_picture.draw_packing(run, None, self.options(box=box))
+        # facets of meshes outside of it
+        walls = picture_space.Walls(self.cylinder, 0)
+        walls.facets = np.array([np.eye(3), np.eye(3) + 5.0])
+        walls.keep(np.zeros(3), np.ones(3))
+        np.testing.assert_array_equal(walls.facets, [np.eye(3)])
+
+    def test_against(self):
+        """Curves against another column than the time."""
+        figure = curve_pictures.draw_history([self.disks], ["kinetic_energy", "contacts"], "max_overlap")
+        history = self.disks.history()
+        for axes, name in zip(figure.axes, ("kinetic_energy", "contacts")):
+            np.testing.assert_array_equal(axes.lines[0].get_xydata(), np.column_stack([history.max_overlap, history[name]]))
+        self.assertEqual(figure.axes[1].get_xlabel(), "largest overlap [m]")
+        plt.close(figure)
+        with self.assertRaisesRegex(PictureError, "history.csv: no column strain; expected one of"):
+            curve_pictures.draw_history([self.disks], ["contacts"], "strain")
+        figure = curve_pictures.draw_history([self.disks], ["contacts"])
+        self.assertEqual(figure.axes[0].get_xlabel(), "time [s]")
         plt.close(figure)
 
     def test_narrow(self):
