@@ -204,7 +204,7 @@ contains
     control%figure_ratio = self%figure_ratio
     ! a pass over layers would replace the impulses that were given
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
-    share = self%drift%goal_share(self%velocity_scale%diameter, self%velocity_scale%own, control%accuracy*self%velocity_scale%value)
+    share = self%drift%goal_share(self%velocity_scale)
     do tries = 1, most_tries + 1
       call self%refinement%solve(self%problem, self%method, control, share, figures%solve, error, self%exact, watch)
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)

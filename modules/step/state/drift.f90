@@ -13,6 +13,7 @@ module gravier_drift
   use gravier_decomposition, only: decomposition_t
   use gravier_moving_cell, only: cell_motion_t
   use gravier_physics, only: physics_t
+  use gravier_velocity_scale, only: velocity_scale_t
   implicit none
   private
   public :: drift_t, drift_words, drift_record, most_drift
@@ -20,9 +21,8 @@ module gravier_drift
   !> errors of its solve below which the motion of a step is not told from them
   real(dp), parameter :: unresolved_times = 2.0_dp
   !> Diameters by which a scene may move in such steps before it can be seen. From `free_part` of that on, solves aim at half of the
-  !> error for each `halving_part`, down to the least share of the goal, and to no less than what tells motion from errors.
-  real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.1_dp, halving_part = 0.05_dp, least_share = 1.0e-3_dp, &
-    & least_of_motion = 0.25_dp
+  !> error for each `halving_part`, down to the least share of the goal.
+  real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.1_dp, halving_part = 0.05_dp, least_share = 1.0e-3_dp
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
   integer, parameter :: of_centre = 1, of_spread = 2, of_cell = 3
@@ -194,20 +194,19 @@ contains
     end do
   end function drift_length
 
-  !> The share of its goal that a solve should aim at.
-  pure real(dp) function drift_goal_share(self, diameter, own, goal) result(share)
+  !> The share of its goal that a solve should aim at: no less than that which it has in a scene without loads and drives, where
+  !> errors are compared with the motion alone.
+  pure real(dp) function drift_goal_share(self, scale) result(share)
     class(drift_t), intent(in) :: self
-    !> of the mean grain; 0 without grains [m]
-    real(dp), intent(in) :: diameter
-    !> root mean square velocity of the bodies in contact before the step, and velocity error that is the goal of its solve [m/s]
-    real(dp), intent(in) :: own, goal
+    !> of the step
+    type(velocity_scale_t), intent(in) :: scale
     real(dp) :: halvings
 
     share = 1.0_dp
-    if (self%steps == 0 .or. .not. (diameter > 0.0_dp .and. goal > 0.0_dp)) return
-    halvings = (self%length()/(most_drift*diameter) - free_part)/halving_part
+    if (self%steps == 0 .or. .not. (scale%diameter > 0.0_dp .and. scale%value > 0.0_dp)) return
+    halvings = (self%length()/(most_drift*scale%diameter) - free_part)/halving_part
     if (.not. halvings > 0.0_dp) return
-    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), least_of_motion*own/goal))
+    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), scale%share*scale%own/scale%value))
   end function drift_goal_share
 
   pure subroutine drift_get_state(self, words)

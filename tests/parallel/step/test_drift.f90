@@ -3,6 +3,7 @@
 program test_drift
   use gravier_kinds, only: dp, i8
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
+  use gravier_velocity_scale, only: velocity_scale_t
   use gravier_drift, only: drift_t, drift_words, most_drift
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_scene
@@ -141,27 +142,31 @@ contains
   end subroutine test_cell
 
   !> Beyond a part of the way that is free, half of the error is aimed at with each further part, down to a least share, and to no
-  !> less than a quarter of what moves.
+  !> less than what is allowed where the motion is all there is.
   subroutine test_share()
     type(simulation_t) :: sim
     type(drift_t) :: drift
     real(dp), parameter :: part = 0.05_dp*most_drift*0.2_dp
+    type(velocity_scale_t) :: at_rest, moving
 
+    at_rest = velocity_scale_t(diameter=0.2_dp, value=1.0_dp)
+    moving = velocity_scale_t(diameter=0.2_dp, value=8.0_dp, share=0.3_dp, own=10.0_dp)
     call make_scene(comm, row//rest, sim)
-    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "before the first step")
+    call check_close(drift%goal_share(at_rest), 1.0_dp, 0.0_dp, "before the first step")
     call set_velocities(sim, [0.0_dp, 1.9_dp*part/h], 0.0_dp)
     call note(drift, sim, 0.0_dp)
-    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "within two parts")
+    call check_close(drift%goal_share(at_rest), 1.0_dp, 0.0_dp, "within two parts")
     call set_velocities(sim, [0.0_dp, 3.1_dp*part/h], 0.0_dp)
     call note(drift, sim, 0.0_dp)
-    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 0.125_dp, 1.0e-9_dp, "three parts beyond them")
-    call check_close(drift%goal_share(0.0_dp, 0.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "without grains")
-    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 0.0_dp), 1.0_dp, 0.0_dp, "without a scale")
-    call check_close(drift%goal_share(0.2_dp, 1.0_dp, 1.0_dp), 0.25_dp, 0.0_dp, "a quarter of what moves")
-    call check_close(drift%goal_share(0.2_dp, 7.0_dp, 1.0_dp), 1.0_dp, 0.0_dp, "no more than the goal")
+    call check_close(drift%goal_share(at_rest), 0.125_dp, 1.0e-9_dp, "three parts beyond them")
+    call check_close(drift%goal_share(velocity_scale_t(value=1.0_dp)), 1.0_dp, 0.0_dp, "without grains")
+    call check_close(drift%goal_share(velocity_scale_t(diameter=0.2_dp)), 1.0_dp, 0.0_dp, "without a scale")
+    call check_close(drift%goal_share(moving), 0.375_dp, 1.0e-12_dp, "what errors are compared with where only motion counts")
+    moving%value = 1.0_dp
+    call check_close(drift%goal_share(moving), 1.0_dp, 0.0_dp, "no more than the goal")
     call set_velocities(sim, [0.0_dp, 1.0_dp], 0.0_dp)
     call note(drift, sim, 0.0_dp)
-    call check_close(drift%goal_share(0.2_dp, 0.0_dp, 1.0_dp), 1.0e-3_dp, 0.0_dp, "the least share")
+    call check_close(drift%goal_share(at_rest), 1.0e-3_dp, 0.0_dp, "the least share")
     call sim%free()
   end subroutine test_share
 
