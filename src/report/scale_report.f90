@@ -26,6 +26,8 @@ module gravier_scale_report
   real(dp), parameter :: most_relative_step = 0.1_dp
   !> fraction of the speed of a wall that errors may have in slow shear
   real(dp), parameter :: error_share = 0.05_dp
+  !> what numbers of so many digits may be off by: a mass that is advised is enough
+  real(dp), parameter :: of_digits = 5.0e-3_dp
   !> part of the period of an oscillation that a step may take
   real(dp), parameter :: most_of_period = 0.1_dp
   !> part of the ups and downs of a table that steps should keep
@@ -124,8 +126,8 @@ contains
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
         & simulation%decomposition%boundaries(scales%pressed)%name//"'", h*most_relative_step/a)
-      error = solver%accuracy*max(g*h, scales%load)
-      if (scales%gain > 0.0_dp .and. scales%gain < error .and. solver%criterion == "velocity_error") then
+      error = solver%accuracy*max(g*h, scales%load)/(1.0_dp + simulation%velocity_scale%stiffness)
+      if (scales%gain > 0.0_dp .and. scales%gain < (1.0_dp - of_digits)*error .and. solver%criterion == "velocity_error") then
         associate (boundary => simulation%decomposition%boundaries(scales%heaviest))
           call warn("boundary '"//boundary%name//"': its load gives it "//figure(scales%gain)//" m/s in a step, less than the "// &
             & "error of "//figure(error)//" m/s that solves may leave: forces under it may be wrong in single steps; a mass of "// &

@@ -105,6 +105,8 @@ class Scales(RunTestCase):
                           said(1e6)[0])
         for text, value in zip(found.groups(), (10.0 * 1e-3 / 1e6, 0.1 * G * 1e-3, most)):
             self.assertAlmostEqual(float(text) / value, 1.0, delta=6e-3)
+        # what it advises is enough
+        self.assertEqual(said(float(found[3])), [])
 
     def test_mean_of_what_enters(self):
         """Of a scene that is filled, the mean grain is that of all that are to enter; of insertions without a number each counts alike."""
