@@ -18,6 +18,8 @@ install(FILES ${PROJECT_BINARY_DIR}/generated/gravierConfig.cmake ${PROJECT_BINA
   ${PROJECT_SOURCE_DIR}/cmake/GravierHDF5.cmake ${PROJECT_SOURCE_DIR}/cmake/FindMUMPS.cmake
   ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake DESTINATION ${package_dir})
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/gravier)
+# cases to begin with, which are run beside a copy of this directory
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/data DESTINATION ${CMAKE_INSTALL_DATADIR}/gravier PATTERN studies EXCLUDE)
 
 # gravier_program(NAME SOURCE): a program on the application library, in bin/ of the build and of the installation
 function(gravier_program name source)

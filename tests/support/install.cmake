@@ -18,6 +18,12 @@ run(${WORK}/build/consumer)
 run(${PYTHON} ${CONSUMER}/check_own.py ${WORK}/build/own_gravier)
 if(PROGRAM)
   run(${WORK}/prefix/bin/gravier --version)
+  # its cases run beside a copy of them; studies need the source tree
+  file(COPY ${WORK}/prefix/share/gravier/data DESTINATION ${WORK})
+  run(${WORK}/prefix/bin/gravier --check data/scenes/biaxial.nml)
+  if(EXISTS ${WORK}/data/studies OR EXISTS ${WORK}/prefix/share/gravier/studies)
+    message(FATAL_ERROR "the installation has studies, which need the source tree")
+  endif()
   # the library and the class of the installation, which find each other
   file(WRITE ${WORK}/find.py
     "from gravier.library import find_library, load\nload()\nwith open('library', 'w') as file:\n    file.write(find_library())\n")
