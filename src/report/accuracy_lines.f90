@@ -98,10 +98,16 @@ contains
 
     text = ""
     associate (drift => simulation%drift, refinement => simulation%refinement)
-      if (refinement%refined > 0) text = "refined     "//counted(refinement%refined, "solve")//" aimed at less error than the "// &
-        & "goal, so that errors do not add up where nothing else moves;"//newline//indent//to_text(refinement%reached)// &
-        & " of them came to it, at the least the "//goal_text(simulation, refinement%least_share)//"; the others gave it up "// &
-        & "after "//counted(refinement%in_vain, "iteration")//" in all"//newline
+      if (refinement%refined > 0) then
+        text = "refined     "//counted(refinement%refined, "solve")//" aimed at less error than the goal, down to the "// &
+          & goal_text(simulation, refinement%least_share)//", so that errors do not add up where nothing else moves; "
+        if (refinement%reached == refinement%refined) then
+          text = text//"all came to it"//newline
+        else
+          text = text//to_text(refinement%reached)//" came to it, the others gave it up after "// &
+            & counted(refinement%in_vain, "iteration")//" in all"//newline
+        end if
+      end if
       if (.not. drifts(simulation)) return
       way = drift%length()/simulation%velocity_scale%diameter
       text = text//"drift       in "//to_text(drift%steps)//" of "//counted(int(simulation%step, i8), "step")// &

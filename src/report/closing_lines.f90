@@ -112,6 +112,10 @@ contains
         & "cost        "//to_text(comm%highest(effort%seconds), 3)//" s in "//counted(effort%solves, "solve")//" with "// &
         & counted(effort%iterations, "iteration")//" in all"//newline
       if (effort%iterations == 0) return
+      if (simulation%refinement%refined > 0) then
+        text = text//"            at another "//goal_name(simulation)//": not known, because solves aimed at less error"//newline
+        return
+      end if
       call effort%looser_range(least, most)
       text = text//"            at "//goal_text(simulation, 10.0_dp)//": "//estimate_text(comm, effort, least, most)
       if (effort%unreached(tenfold) > 0) text = text//": "//counted(effort%unreached(tenfold), "solve")//" did not reach it"

@@ -209,7 +209,7 @@ contains
 
     associate (tally => simulation%tally, solver => simulation%config%solver)
       may = simulation%failed == 0 .and. .not. tally%mended_share() > often_mended .and. .not. overlaps_grew(simulation) .and. &
-        & .not. drifts(simulation)
+        & .not. drifts(simulation) .and. simulation%refinement%refined == 0
       if (goal_name(simulation) == "accuracy") then
         may = may .and. 10.0_dp*solver%accuracy <= loosest*(1.0_dp + epsilon(1.0_dp))
       else

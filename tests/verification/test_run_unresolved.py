@@ -24,12 +24,12 @@ class Unresolved(SmallScene):
     def test_a_load_that_grows(self):
         """At the default accuracy the lid stays, because solves aim at a smaller one, and the log says how many and at which."""
         record, down = self.press("default")
-        told = re.search(r"\nrefined     (\d+) solves aimed at less error than the goal, so that errors do not add up where nothing else moves;\n"
-                         r" +(\d+) of them came to it, at the least the accuracy (\S+); the others gave it up after (\d+) iterations in all\n",
-                         record.run.stdout)
+        told = re.search(r"\nrefined     (\d+) solves aimed at less error than the goal, down to the accuracy (\S+), so that errors do not add up where "
+                         r"nothing else moves; all came to it\n", record.run.stdout)
         self.assertTrue(told, record.run.stdout)
-        refined, reached, aim = int(told[1]), int(told[2]), float(told[3])
-        self.assertTrue(0.9 * STEPS < refined <= STEPS and 0.9 * refined < reached <= refined, told[0])
+        refined, aim = int(told[1]), float(told[2])
+        self.assertTrue(0.9 * STEPS < refined <= STEPS, told[0])
+        self.assertIn("\n            at another accuracy: not known, because solves aimed at less error\n", record.run.stdout)
         self.assertTrue(1e-4 <= aim < 1e-2, told[0])
         solver = re.search(r"\nsolver      (\d+) solves, (\d+) iterations,", record.run.stdout)
         self.assertEqual(int(solver[1]), STEPS)
@@ -61,7 +61,7 @@ class Unresolved(SmallScene):
     def test_hard_to_hold(self):
         """Where the iterations that solves may make do not keep errors from adding up, the log says both."""
         record, _ = self.press("few", status=3, max_iterations=30)
-        self.assertIn("\nrefined ", record.run.stdout)
+        self.assertRegex(record.run.stdout, r"\nrefined .*; \d+ came to it, the others gave it up after \d+ iterations in all\n")
         self.assertRegex(record.run.stdout, r"\ndrift .*\n +that motion may be nothing but errors; a smaller &solver accuracy, which every solve has to "
                          r"reach, tells\n")
 
