@@ -15,10 +15,12 @@ module gravier_config_check_boundary
   use gravier_config_report, only: report_t, expect, expect_own_name, miss, is_given, shown_text, ordinal
   implicit none
   private
-  public :: check_boundaries, check_contact, is_pivoting
+  public :: check_boundaries, check_contact, is_pivoting, not_turning
 
   !> what `is_pivoting` wants
   character(len=*), parameter :: pivoting_text = "a finite real number >= 0; 0 where dimension = 2"
+  !> what is expected of resistances to rolling and pivoting where rotation = .false.
+  character(len=*), parameter :: not_turning = "0 where rotation = .false.: bodies that do not turn do not roll"
 
 contains
 
@@ -48,7 +50,8 @@ contains
       call check_free(report, config%boundaries(i), error)
       call check_oscillation(report, config%boundaries(i), error)
       call check_loads(report, config%scene%dimension, config%boundaries(i), error)
-      call check_contact(report, config%scene%dimension, config%boundaries(i)%contact, "boundary", "", error)
+      call check_contact(report, config%scene%dimension, config%scene%rotation, config%boundaries(i)%contact, "boundary", "", &
+        & error)
       call expect(report, config%boundaries(i)%remove_at >= 0.0_dp, "boundary", "remove_at", error)
       if (allocated(error)) return
     end do
@@ -215,9 +218,11 @@ contains
   end function is_pivoting
 
   !> Coefficients of contact that a group has under keys that begin with a prefix.
-  subroutine check_contact(report, dimension, contact, group, prefix, error)
+  subroutine check_contact(report, dimension, turns, contact, group, prefix, error)
     type(report_t), intent(in) :: report
     integer, intent(in) :: dimension
+    !> bodies do
+    logical, intent(in) :: turns
     type(coefficients_t), intent(in) :: contact
     character(len=*), intent(in) :: group, prefix
     type(error_t), allocatable, intent(inout) :: error
@@ -229,6 +234,8 @@ contains
     call expect(report, contact%rolling_friction >= 0.0_dp, group, prefix//"rolling_friction", error)
     call expect(report, is_pivoting(dimension, contact%pivoting_friction), group, prefix//"pivoting_friction", error, &
                 pivoting_text)
+    call expect(report, turns .or. .not. contact%rolling_friction > 0.0_dp, group, prefix//"rolling_friction", error, not_turning)
+    call expect(report, turns .or. .not. contact%pivoting_friction > 0.0_dp, group, prefix//"pivoting_friction", error, not_turning)
   end subroutine check_contact
 
 end module gravier_config_check_boundary

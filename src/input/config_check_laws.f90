@@ -11,7 +11,7 @@ module gravier_config_check_laws
   use gravier_config_slots, only: slot_t, slot_of, belongs
   use gravier_config_report, only: report_t, expect, expect_own_name, ordinal
   use gravier_config_laws, only: material_number, collect_laws
-  use gravier_config_check_boundary, only: is_pivoting
+  use gravier_config_check_boundary, only: is_pivoting, not_turning
   implicit none
   private
   public :: check_materials, check_laws
@@ -142,6 +142,8 @@ contains
       call expect(report, holds, "law", trim(keys(k)%name), error)
       if (keys(k)%name == "pivoting_friction") call expect(report, is_pivoting(config%scene%dimension, slot%real), "law", &
         & "pivoting_friction", error, "a finite real number >= 0; 0 where dimension = 2")
+      if (any(keys(k)%name == [character(len=17) :: "rolling_friction", "pivoting_friction"])) call expect(report, &
+        & config%scene%rotation .or. .not. slot%real > 0.0_dp, "law", trim(keys(k)%name), error, not_turning)
     end do
   end subroutine check_values
 
