@@ -10,6 +10,7 @@ module gravier_time_stepper
   use gravier_method, only: method_t
   use gravier_convergence_history, only: effort_t
   use gravier_backoff, only: backoff_t
+  use gravier_solve, only: solve_contacts
   use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged, solve_unbounded
   use gravier_fallback, only: fallback_t
   use gravier_refinement, only: refinement_t
@@ -206,7 +207,12 @@ contains
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
     share = self%drift%goal_share(self%velocity_scale)
     do tries = 1, most_tries + 1
-      call self%refinement%solve(self%problem, self%method, control, share, figures%solve, error, self%exact, watch)
+      call self%refinement%decide(self%problem, control, share)
+      if (self%refinement%aims) then
+        call self%refinement%solve(self%problem, self%method, control, figures%solve, error, watch)
+      else
+        call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+      end if
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
       self%messages = self%messages + self%problem%shared%messages
       self%values = self%values + self%problem%shared%values

@@ -1,5 +1,5 @@
 !> Solves that aim at less error than they have to, as long as that costs little. Errors within the goal may add up from step to
-!> step where nothing moves (gravier_drift). What a solve leaves of the smaller goal, the next one starts from, and it is no failure.
+!> step where nothing moves (gravier_drift). What a solve leaves of the smaller goal, the next one starts from: that is no failure.
 module gravier_refinement
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -10,14 +10,14 @@ module gravier_refinement
   use gravier_method, only: method_t
   use gravier_backoff, only: backoff_t, backoff_words, backoff_record
   use gravier_solve, only: solve_contacts
-  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_watch_t, exact_solution_t, by_velocity, &
+  use gravier_solve_report, only: solve_control_t, solve_report_t, solve_watch_t, by_velocity, &
     & solve_converged, solve_diverged, solve_unbounded
   implicit none
   private
   public :: refinement_t, refinement_words, refinement_record
 
-  !> iterations in which the smaller goal has to be reached, and times that they are doubled where they do not suffice, because loads
-  !> take more from end to end of a high scene
+  !> iterations in which the smaller goal has to be reached, and times that they are doubled where they do not suffice, because
+  !> loads take more from end to end of a high scene
   integer, parameter :: few_iterations = 200, most_doublings = 3
   !> share of the goal above which a smaller one is not worth aiming at, and tolerance of the residual that none falls below
   real(dp), parameter :: worth_it = 0.5_dp, least_tolerance = 1.0e-12_dp
@@ -32,12 +32,17 @@ module gravier_refinement
     integer(i8) :: refined = 0, reached = 0, in_vain = 0
     !> the smallest error aimed at, over that of the user
     real(dp) :: least_share = 1.0_dp
+    !> whether the next solve aims at less error, by the last `decide`
+    logical :: aims = .false.
+    !> the error that it aims at, over that of the user
+    real(dp), private :: share = 1.0_dp
     !> solves that might have aimed at less error, since the first step
     integer, private :: turns = 0
     !> how often the iterations that they may take were doubled
     integer, private :: doublings = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
+    procedure :: decide => refinement_decide
     procedure :: solve => refinement_solve
     procedure :: get_state => refinement_get_state
     procedure :: set_state => refinement_set_state
@@ -45,43 +50,44 @@ module gravier_refinement
 
 contains
 
-  !> Solve: first to a share of the goal, unless that is hardly smaller or too many solves before did not come to it; then, where
-  !> that has failed, to the goal of the user, from where the first has ended. The report is that of both as of one. Collective.
-  subroutine refinement_solve(self, problem, method, control, share, report, error, exact, watch)
+  !> Whether the next solve aims at a share of its goal: not where that is hardly smaller, or where too many solves before did not
+  !> come to it.
+  pure subroutine refinement_decide(self, problem, control, share)
+    class(refinement_t), intent(inout) :: self
+    type(contact_problem_t), intent(in) :: problem
+    type(solve_control_t), intent(in) :: control
+    real(dp), intent(in) :: share
+
+    self%share = share
+    self%aims = .not. (share > worth_it .or. control%criterion /= by_velocity .or. problem%n_contacts == 0)
+    if (.not. self%aims) return
+    self%turns = self%turns + 1
+    self%aims = self%backoff%allows(self%turns)
+  end subroutine refinement_decide
+
+  !> Solve: first to the share of the goal, then, where that has failed, to the goal of the user, from where the first has ended.
+  !> The report is that of both as of one. Collective.
+  subroutine refinement_solve(self, problem, method, control, report, error, watch)
     class(refinement_t), intent(inout) :: self
     !> with its velocity scale
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     !> with the goal of the user
     type(solve_control_t), intent(in) :: control
-    !> of the goal that is aimed at
-    real(dp), intent(in) :: share
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
-    !> needed where the criterion is by_error
-    class(exact_solution_t), intent(in), optional :: exact
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_report_t) :: first
-    logical :: aims
 
-    aims = .not. (share > worth_it .or. control%criterion /= by_velocity .or. problem%n_contacts == 0)
-    if (aims) then
-      self%turns = self%turns + 1
-      aims = self%backoff%allows(self%turns)
-    end if
-    if (.not. aims) then
-      call solve_contacts(problem, method, control, report, error, exact, watch)
-      return
-    end if
-    call attempt(self, problem, method, control, share, first, error, watch)
+    call attempt(self, problem, method, control, first, error, watch)
     if (allocated(error)) return
     if (first%status == solve_converged) then
       report = first
       report%goal = control%accuracy
-      report%violation_allowed = first%violation_allowed/share
+      report%violation_allowed = first%violation_allowed/self%share
       return
     end if
-    call solve_contacts(problem, method, control, report, error, exact, watch)
+    call solve_contacts(problem, method, control, report, error, watch=watch)
     if (allocated(error)) return
     call join(report, first)
     ! both are one solve
@@ -89,12 +95,11 @@ contains
   end subroutine refinement_solve
 
   !> Aim at a share of the goal. Impulses of a solve that found none are those of its start. Collective.
-  subroutine attempt(self, problem, method, control, share, report, error, watch)
+  subroutine attempt(self, problem, method, control, report, error, watch)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
-    real(dp), intent(in) :: share
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
@@ -102,14 +107,14 @@ contains
     type(solve_control_t) :: further
 
     further = control
-    further%accuracy = share*control%accuracy
-    further%tolerance = max(share*control%tolerance, min(control%tolerance, least_tolerance))
+    further%accuracy = self%share*control%accuracy
+    further%tolerance = max(self%share*control%tolerance, min(control%tolerance, least_tolerance))
     further%max_iterations = min(control%max_iterations, few_iterations*2**self%doublings)
     call copy_impulses(problem, kept)
     call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return
     self%refined = self%refined + 1
-    self%least_share = min(self%least_share, share)
+    self%least_share = min(self%least_share, self%share)
     if (report%status == solve_converged) then
       self%reached = self%reached + 1
       if (self%doublings > 0 .and. 4*report%iterations < further%max_iterations) self%doublings = self%doublings - 1

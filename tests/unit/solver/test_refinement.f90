@@ -7,6 +7,7 @@ program test_refinement
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_method, only: method_t
   use gravier_nlgs, only: nlgs_t
+  use gravier_solve, only: solve_contacts
   use gravier_solve_report, only: solve_control_t, solve_report_t, by_velocity, by_residual, solve_converged, solve_exhausted
   use gravier_refinement, only: refinement_t, refinement_words
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -52,6 +53,24 @@ contains
     control%layered = .false.
   end subroutine prepare
 
+  !> Solve with a share of the goal to aim at.
+  subroutine solve(refinement, sim, method, control, share, report, error)
+    type(refinement_t), intent(inout) :: refinement
+    type(simulation_t), intent(inout) :: sim
+    class(method_t), intent(inout) :: method
+    type(solve_control_t), intent(in) :: control
+    real(dp), intent(in) :: share
+    type(solve_report_t), intent(out) :: report
+    type(error_t), allocatable, intent(inout) :: error
+
+    call refinement%decide(sim%problem, control, share)
+    if (refinement%aims) then
+      call refinement%solve(sim%problem, method, control, report, error)
+    else
+      call solve_contacts(sim%problem, method, control, report, error)
+    end if
+  end subroutine solve
+
   !> The impulse of the ground [N s].
   real(dp) function on_ground(sim) result(impulse)
     type(simulation_t), intent(in) :: sim
@@ -74,7 +93,7 @@ contains
 
     call prepare(sim, control)
     allocate (nlgs_t :: method)
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check(.not. allocated(error), "no error")
     call check_close(on_ground(sim), 2.0_dp, 1.0e-5_dp, "the ground carries both")
     call check_equal(report%status, solve_converged, "it has converged")
@@ -101,9 +120,9 @@ contains
 
     call prepare(sim, control)
     allocate (nlgs_t :: method)
-    call refinement%solve(sim%problem, method, control, 0.6_dp, report, error)
+    call solve(refinement, sim, method, control, 0.6_dp, report, error)
     control%criterion = by_residual
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check_equal(int(refinement%refined), 0, "none aimed at less error")
     call check_close(on_ground(sim), 1.2_dp, 0.0_dp, "the impulses were good enough")
     call sim%free()
@@ -120,7 +139,7 @@ contains
 
     call prepare(sim, control)
     allocate (method, source=scaling_t(factor=1.001_dp))
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check_equal(report%status, solve_converged, "in vain: it has converged")
     call check(report%iterations >= 200, "in vain: iterations of both")
     call check_close(on_ground(sim), 1.2_dp*1.001_dp**report%iterations, 1.0e-10_dp, "in vain: impulses of the end")
@@ -144,7 +163,7 @@ contains
     call prepare(sim, control)
     speed = sim%problem%sub(1)%v_global(2, 1)
     allocate (method, source=scaling_t(factor=1.0e30_dp))
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check(report%status == solve_converged .or. report%status == solve_exhausted, "diverged: it begins anew")
     call check_equal(int(refinement%reached), 0, "diverged: not reached")
     if (report%status == solve_converged) then
@@ -172,16 +191,16 @@ contains
     allocate (method, source=scaling_t(factor=1.0_dp))
     do k = 1, size(further)
       before = int(refinement%in_vain)
-      call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+      call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
       call check_equal(int(refinement%in_vain) - before, further(k), "iterations of an attempt")
     end do
     control%max_iterations = 50
     before = int(refinement%in_vain)
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check_equal(int(refinement%in_vain) - before, 50, "the limit of all solves")
     control%max_iterations = 5000
     allocate (nlgs_t :: solver)
-    call refinement%solve(sim%problem, solver, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, solver, control, 1.0e-10_dp, report, error)
     call refinement%get_state(words)
     call check_equal(int(words(2)), 2, "fewer after one that needs few")
     call sim%free()
@@ -203,13 +222,13 @@ contains
     control%max_iterations = 2
     allocate (method, source=scaling_t(factor=1.0_dp))
     do k = 1, 9
-      call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+      call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     end do
     call check_equal(int(refinement%refined), 8, "attempts in vain before a pause")
     call refinement%get_state(words)
     call again%set_state(words)
     do k = 1, 2
-      call again%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+      call solve(again, sim, method, control, 1.0e-10_dp, report, error)
       call check_equal(int(again%refined), k - 1, "the next one is left alone too, after a restart")
     end do
     call sim%free()
@@ -228,7 +247,7 @@ contains
     call prepare(sim, control)
     control%trace = .true.
     allocate (method, source=scaling_t(factor=1.0_dp))
-    call refinement%solve(sim%problem, method, control, 1.0e-10_dp, report, error)
+    call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check(report%n_trace > 20, "checks of both")
     call check_close(report%trace(1, 1), 0.0_dp, 0.0_dp, "the first one")
     call check(report%trace(1, report%n_trace) >= 200.0_dp, "those of the second go on")
