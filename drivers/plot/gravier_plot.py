@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Draw what runs left in their directories: packings with force chains, histories, convergence, profiles, movies; and samples."""
 import argparse
+import re
 import sys
 from pathlib import Path
 
@@ -22,6 +23,8 @@ from picture_style import PictureError
 from whole_file import PICTURES, claim, save_figure
 
 
+#: what begins with a minus and is a number
+NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 #: along the longer side of a picture in dots: its memory is the square of them
 MOST_DOTS = 20000
 
@@ -76,9 +79,12 @@ def parse(arguments):
     profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; the last one unless told")
     profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step")
     profile.add_argument("--columns", default="solid_fraction,velocity,stress", metavar="A,B", help="%(default)s unless told")
+    # numbers as -1e-3 are no options
+    packing._negative_number_matcher = NEGATIVE
     movie = kinds.add_parser("movie", parents=[one, look], help="all written steps")
     movie.add_argument("--every", type=int, default=1, metavar="N", help="every N-th written step (1)")
     movie.add_argument("--fps", type=float, default=10.0, metavar="N", help="frames a second (10)")
+    movie._negative_number_matcher = NEGATIVE
     return parser.parse_args(arguments)
 
 

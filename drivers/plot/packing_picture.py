@@ -65,6 +65,8 @@ def least_colour(kind, speed, bodies):
 
 def spread(values, kind, least=0.0):
     """Least and largest value of the colours: a few extreme bodies must not make all others look alike, nor colours end below `least`."""
+    if len(values) == 0:
+        return 0.0, least or 1.0
     top = max(numpy.quantile(numpy.abs(values), 0.98), least) or numpy.abs(values).max() or 1.0
     if values.min() < 0.0 or kind.startswith("velocity_"):
         return -top, top

@@ -394,7 +394,7 @@ contains
     if (allocated(error)) return
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
-      call self%tally%add_solve(solve, self%velocity_scale%kind, self%velocity_scale%own)
+      call self%tally%add_solve(solve, self%velocity_scale%kind)
       self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
       if (solve%status == solve_diverged) then
@@ -416,7 +416,7 @@ contains
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
     call self%tally%add_step(figures%max_overlap, figures%interface_statistics, shifts/self%overlap_allowed > rounded_shift, &
       & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains)
-    call self%drift%note(self%decomposition, self%physics, self%mass, self%tally%own_velocity, self%tally%velocity_error)
+    call self%drift%note(self%decomposition, self%physics, self%boundary_impulses, self%mass, self%velocity_scale, figures%solve)
     self%step = self%step + 1
     self%time = self%step*self%physics%h
     figures%kinetic_energy = self%balance%kinetic

@@ -225,6 +225,15 @@ class Pictures(RunTestCase):
                                 (self.disks, [7, 8, 7, 8], "no body in this --box; expected one at least of those from")):
             with self.assertRaisesRegex(PictureError, words):
                 packing_picture.draw_packing(run, None, self.options(box=box))
+        # a movie in some of whose pictures the box is empty, and numbers that begin with a minus
+        high = self.disks.bodies(0).position[:, 1].max()
+        self.assertLess((self.disks.bodies(150).position[:, 1] + self.disks.bodies(150).radius).max(), high)
+        for colour in ("speed", "radius", "material"):
+            options = self.options(box=[-1.0, 1.0, high, high + 1.0], colour=colour, chains=True)
+            frame = packing_picture.shared_frame(self.disks, [0, 150], options)
+            for step in (0, 150):
+                plt.close(packing_picture.draw_packing(self.disks, step, options, frame))
+        self.assertEqual(gravier_plot.parse(["packing", "run", "--box", "-1e-3", "0.5", "-.1", "5"]).box, [-1e-3, 0.5, -0.1, 5.0])
         # facets of meshes outside of it
         walls = picture_space.Walls(self.cylinder, 0)
         walls.facets = np.array([np.eye(3), np.eye(3) + 5.0])

@@ -322,7 +322,7 @@ class Package(RunTestCase):
 
     def test_colours_of_a_movie(self):
         """One value has one colour in all frames, also where a frame alone would have another unit."""
-        run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True, regions=False)
+        run, options = self.run_, types.SimpleNamespace(view=(-60.0, 20.0), colour="speed", chains=True, regions=False, box=None)
         frame = packing_picture.shared_frame(run, list(run.steps), options)
         speeds = [np.linalg.norm(run.bodies(step).velocity, axis=1) for step in run.steps]
         tops = [np.quantile(values, 0.98) for values in speeds]

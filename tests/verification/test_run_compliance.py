@@ -527,15 +527,31 @@ class Loads(ComplianceScene):
             late = history["time"] > 1.0
             wanted = -np.interp(history["time"], time, force)
             at = f"load on springs of {stiffness:g} N/m, swings by {swing:g}"
-            self.verify(at, "force on the base [N]", history["force_y:base"][late], wanted[late], 0.008 * load)
+            self.verify(at, "force on the base [N]", history["force_y:base"][late], wanted[late], 0.012 * load)
             if swing == 0.0:
                 # each contact bears it
                 self.verify(at, "energy of the springs [J]", history["elastic_energy"][late], 0.5 * (count + 1) * load**2 / stiffness,
-                            0.015 * 0.5 * (count + 1) * load**2 / stiffness)
-            # h F/m over 1 + h^2 k/m, the mean over contacts of two disks, one on the base and one under the lid
-            squares = step**2 * stiffness * (2.0 * (count - 1) / MASS + 1.0 / MASS + 1.0 / MASS + 0.5 / MASS) / (count + 1)
+                            0.03 * 0.5 * (count + 1) * load**2 / stiffness)
+            # h F/m over 1 + h^2 k/m, the mean over contacts of two disks, one on the base and one under the lid, at most 20 each
+            squares = sum(number * min(step**2 * stiffness * inverse / MASS, 20.0) for number, inverse in ((count - 1, 2.0), (1, 1.0), (1, 1.5))) / (count + 1)
             self.verify(at, "velocity scale [m/s]", history["velocity_scale"][-1], step * load / MASS / (1.0 + squares), 1e-3 * step * load / MASS)
             self.assertRegex(record.run.stdout, r" m/s: load on springs in \d+ solves")
+
+    def test_springs_that_bear_nothing(self):
+        """A wall with springs above rigid disks at rest that it does not touch changes nothing, and one that touches a few of them counts among
+        all contacts that bear something."""
+        disks = [Grain([0.0, RADIUS * (2 * k + 1)], radius=RADIUS) for k in range(3)]
+        roof = plane([0.0, 6.04 * RADIUS], [0.0, -1.0], name="roof", material="m")
+        step, stiffness = 1.0 / 1024, 1e6
+        self.step = step
+        slow = {"criterion": "velocity_error", "tolerance": 1e-2, "check_every": 10, "warm_start": True}
+        for title, floor in (("above", {}), ("below", {"material": "m"})):
+            record = self.play(title, [Grain(one.place, radius=RADIUS, material=2) for one in disks], [plane([0.0, 0.0], [0.0, 1.0], name="floor", **floor), roof],
+                               (0.0, -G), 600, solver=slow, material=[{"name": "m"}, {"name": "n"}],
+                               law=[{"materials": ["m", "n"], "kind": "elastic", "normal_stiffness": stiffness, "spring_restitution": 0.2}],
+                               scene={"alert_distance": 0.1 * RADIUS}, output={"every": 0})
+            squares = step**2 * stiffness / MASS / 3.0 if floor else 0.0
+            self.verify(f"springs {title} rigid disks", "velocity scale [m/s]", record.run.history()["velocity_scale"][-1], step * G / (1.0 + squares), 1e-12)
 
 
 class Invariance(ComplianceScene):

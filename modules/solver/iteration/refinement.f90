@@ -19,6 +19,8 @@ module gravier_refinement
   !> iterations in which the smaller goal has to be reached, and times that they are doubled where they do not suffice, because
   !> loads take more from end to end of a high scene
   integer, parameter :: few_iterations = 200, most_doublings = 3
+  !> part of the iterations of a solve that it may aim at less error in at most
+  integer, parameter :: part_of_all = 4
   !> share of the goal above which a smaller one is not worth aiming at, and tolerance of the residual that none falls below
   real(dp), parameter :: worth_it = 0.5_dp, least_tolerance = 1.0e-12_dp
 
@@ -78,6 +80,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_report_t) :: first
+    type(solve_control_t) :: further
 
     call attempt(self, problem, method, control, first, error, watch)
     if (allocated(error)) return
@@ -87,7 +90,9 @@ contains
       report%violation_allowed = first%violation_allowed/self%share
       return
     end if
-    call solve_contacts(problem, method, control, report, error, watch=watch)
+    further = control
+    further%max_iterations = control%max_iterations - first%iterations
+    call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return
     call join(report, first)
     ! both are one solve
@@ -109,7 +114,7 @@ contains
     further = control
     further%accuracy = self%share*control%accuracy
     further%tolerance = max(self%share*control%tolerance, min(control%tolerance, least_tolerance))
-    further%max_iterations = min(control%max_iterations, few_iterations*2**self%doublings)
+    further%max_iterations = min(control%max_iterations/part_of_all, few_iterations*2**self%doublings)
     call copy_impulses(problem, kept)
     call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return

@@ -85,7 +85,7 @@ module gravier_contact_problem
     logical, allocatable :: joins(:)
     !> largest product of the step and the frequency sqrt(k W_nn) of a normal spring
     real(dp) :: stiffest = 0.0_dp
-    !> compliant contacts, and the sum of h^2 k W_nn over them
+    !> compliant contacts that are pressed together, and the sum of h^2 k W_nn over them, of which only so much counts
     integer :: n_springs = 0
     real(dp) :: stiffness = 0.0_dp
     !> gap at q_m (n_contacts) [m]

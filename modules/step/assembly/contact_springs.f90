@@ -16,6 +16,10 @@ module gravier_contact_springs
   private
   public :: pack_spring, stretch_spring, conclude_springs, measure_springs, spring_energies, find_elongation, put_elongation
 
+  !> The most that a contact counts of h^2 k W_nn: springs that are stiffer are as rigid contacts for the step, whose forces do not
+  !> depend on how stiff they are.
+  real(dp), parameter :: most_stiffness = 20.0_dp
+
 contains
 
   !> Give contact `c` its springs: shifts and compliances. The contact is packed but for these and for its local operator; a rigid
@@ -39,8 +43,10 @@ contains
       call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
       call own%damp(w(1), h, sub%gap(c))
       sub%stiffest = max(sub%stiffest, h*sqrt(spring%stiffness(1)*w(1)))
-      sub%stiffness = sub%stiffness + h**2*spring%stiffness(1)*w(1)
-      sub%n_springs = sub%n_springs + 1
+      if (sub%gap(c) < 0.0_dp) then
+        sub%stiffness = sub%stiffness + min(h**2*spring%stiffness(1)*w(1), most_stiffness)
+        sub%n_springs = sub%n_springs + 1
+      end if
       law(:) = own%law(1, h, sub%gap(c))
       sub%hot(q, row%compliance_n, g) = law(1)
       sub%hot(q, row%shift, g) = law(2)

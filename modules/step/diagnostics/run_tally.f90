@@ -45,8 +45,8 @@ module gravier_run_tally
     !> solves that tried a pass over layers, those of them that went on from it, and sweeps that the passes took
     integer(i8) :: tried_layers = 0, took_layers = 0
     real(dp) :: layered_sweeps = 0.0_dp
-    !> of the last solve; the bodies in contact, before it [m/s]
-    real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp, own_velocity = 0.0_dp
+    !> of the last solve [m/s]
+    real(dp) :: velocity_error = 0.0_dp, velocity_scale = 0.0_dp
     !> steps in which cores of bodies with shapes overlapped, and the most pairs of pieces in one
     integer(i8) :: steps_with_cores = 0, most_cores = 0
     !> steps in which bodies touched in more points than are kept, and the most points left out in one
@@ -76,13 +76,11 @@ contains
   end function relative_error
 
   !> Add a solve.
-  pure subroutine run_tally_add_solve(self, solve, kind, own)
+  pure subroutine run_tally_add_solve(self, solve, kind)
     class(run_tally_t), intent(inout) :: self
     type(solve_report_t), intent(in) :: solve
     !> of its velocity scale
     character(len=*), intent(in) :: kind
-    !> root mean square velocity of the bodies in contact at the start of the step, by mass as the velocity error [m/s]
-    real(dp), intent(in) :: own
 
     self%solves = self%solves + 1
     select case (solve%status)
@@ -111,7 +109,6 @@ contains
     if (solve%status == solve_diverged) return
     self%velocity_error = solve%velocity_error
     self%velocity_scale = solve%velocity_scale
-    self%own_velocity = own
     self%worst_residual = max(self%worst_residual, solve%residual)
     self%worst_error = max(self%worst_error, relative_error(solve))
     if (relative_error(solve) > far_off) self%far_off = self%far_off + 1

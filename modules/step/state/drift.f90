@@ -10,6 +10,7 @@
 module gravier_drift
   use gravier_kinds, only: dp, i8
   use gravier_body_store, only: body_set_t
+  use gravier_solve_report, only: solve_report_t, solve_converged
   use gravier_decomposition, only: decomposition_t
   use gravier_moving_cell, only: cell_motion_t
   use gravier_physics, only: physics_t
@@ -22,7 +23,9 @@ module gravier_drift
   real(dp), parameter :: unresolved_times = 2.0_dp
   !> Diameters by which a scene may move in such steps before it can be seen. From `free_part` of that on, solves aim at half of the
   !> error for each `halving_part`, down to the least share of the goal.
-  real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.1_dp, halving_part = 0.05_dp, least_share = 1.0e-3_dp
+  real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.4_dp, halving_part = 0.04_dp, least_share = 1.0e-3_dp
+  !> times the errors of solves above which a grain is in the air
+  real(dp), parameter :: in_air = 10.0_dp
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
   integer, parameter :: of_centre = 1, of_spread = 2, of_cell = 3
@@ -53,24 +56,30 @@ contains
     drift_words = 1 + 9*(of_cell + n_boundaries)
   end function drift_words
 
-  !> Add the ways of a step that has ended, if its motion is not told from the error of its solve. Collective.
-  subroutine drift_note(self, decomposition, physics, mass, own, error)
+  !> Add the ways of a step that has ended, if its motion is not told from the error of its solve, which has
+  !> converged. All velocities are those about
+  !> what all boundaries have in common. Collective.
+  subroutine drift_note(self, decomposition, physics, impulses, mass, scale, solve)
     class(drift_t), intent(inout) :: self
     !> with the velocities of the end of the step
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    !> mass of the free grains [kg]; root mean square velocity of the bodies in contact before the step, and velocity error of its
-    !> solve [m/s]
-    real(dp), intent(in) :: mass, own, error
+    !> of the contacts on the boundaries (nd, boundaries) [N s]
+    real(dp), intent(in) :: impulses(:, :)
+    !> of the free grains [kg]
+    real(dp), intent(in) :: mass
+    !> of the step
+    type(velocity_scale_t), intent(in) :: scale
+    type(solve_report_t), intent(in) :: solve
     real(dp) :: velocity(9), gradient(9), most
     integer :: b
 
-    most = unresolved_times*error
-    if (.not. own < most) return
+    most = unresolved_times*solve%velocity_error
+    if (.not. (scale%own < most .and. solve%status == solve_converged)) return
     self%steps = self%steps + 1
     if (.not. allocated(self%way)) allocate (self%way(9, of_cell + size(decomposition%boundaries)), source=0.0_dp)
     if (mass > 0.0_dp) then
-      call find_motion(decomposition, mass, velocity, gradient)
+      call find_motion(decomposition, mass, scale%frame, most, velocity, gradient)
       call add_way(velocity, physics%h, most, self%way(:, of_centre))
       call add_way(gradient, physics%h, most, self%way(:, of_spread))
     end if
@@ -80,15 +89,16 @@ contains
     end if
     velocity(:) = 0.0_dp
     do b = 1, size(decomposition%boundaries)
+      ! one that bears nothing moves freely
+      if (.not. any(abs(impulses(:, b)) > 0.0_dp)) cycle
       associate (boundary => decomposition%boundaries(b))
-        velocity(1:3) = merge(boundary%velocity, 0.0_dp, boundary%free)
+        velocity(1:3) = merge(boundary%velocity - scale%frame, 0.0_dp, boundary%free)
       end associate
       call add_way(velocity, physics%h, most, self%way(:, of_cell + b))
     end do
   end subroutine drift_note
 
-  !> Add the way of a step at a velocity, of which no more counts than the errors may be: what is faster, such as grains in the air,
-  !> is not one of the bodies in contact.
+  !> Add the way of a step at a velocity, of which no more counts than the errors may be.
   pure subroutine add_way(velocity, h, most, way)
     !> (9) [m/s], [s], [m/s]
     real(dp), intent(in) :: velocity(:), h, most
@@ -100,11 +110,11 @@ contains
     way(:) = way + (h*min(1.0_dp, most/max(speed, most)))*velocity
   end subroutine add_way
 
-  !> Velocity of the centre of mass and of the spread of the free grains. Collective.
-  subroutine find_motion(decomposition, mass, velocity, spread)
+  !> Velocity of the centre of mass and of the spread of the free grains, but for those that move freely. Collective.
+  subroutine find_motion(decomposition, mass, frame, most, velocity, spread)
     type(decomposition_t), intent(in) :: decomposition
-    !> of the free grains [kg]
-    real(dp), intent(in) :: mass
+    !> of the free grains [kg]; velocity of the observer, and what errors may be [m/s]
+    real(dp), intent(in) :: mass, frame(3), most
     !> (9) [m/s]
     real(dp), intent(out) :: velocity(9), spread(9)
     real(dp) :: parts(n_sums, size(decomposition%owned)), sums(n_sums), square
@@ -116,7 +126,7 @@ contains
     open(nd + 1:) = .false.
     parts(:, :) = 0.0_dp
     do s = 1, size(parts, 2)
-      call add_grains(decomposition%owned(s), open, parts(:, s))
+      call add_grains(decomposition%owned(s), open, frame, most, parts(:, s))
     end do
     call decomposition%comm%sum_parts(parts, sums)
     velocity(:) = 0.0_dp
@@ -137,28 +147,34 @@ contains
     end do
   end subroutine find_motion
 
-  !> Sums over the free grains that are owned by a subdomain; those that sleep have no part in them.
-  pure subroutine add_grains(bodies, open, part)
+  !> Sums over the free grains that are owned by a subdomain; those that sleep, or that are so fast that they are in the air, have
+  !> no part in them.
+  pure subroutine add_grains(bodies, open, frame, most, part)
     type(body_set_t), intent(in) :: bodies
     !> axes along which grains have a place
     logical, intent(in) :: open(3)
+    !> velocity of the observer, and what errors may be [m/s]
+    real(dp), intent(in) :: frame(3), most
     real(dp), intent(inout) :: part(n_sums)
+    real(dp) :: v(bodies%nd)
     integer :: k, r, d, e
 
     do r = 1, bodies%awake%n
       do k = bodies%awake%first(r), bodies%awake%last(r)
         if (bodies%glued(k) > 0) cycle
+        v(:) = bodies%velocity(1:bodies%nd, k) - frame(1:bodies%nd)
+        if (norm2(v) > in_air*most) cycle
         associate (m => bodies%mass(k), nd => bodies%nd)
           part(in_mass) = part(in_mass) + m
           do d = 1, nd
-            part(in_momentum + d) = part(in_momentum + d) + m*bodies%velocity(d, k)
+            part(in_momentum + d) = part(in_momentum + d) + m*v(d)
           end do
           do e = 1, nd
             if (.not. open(e)) cycle
             part(in_place + e) = part(in_place + e) + m*bodies%position(e, k)
             part(in_square + e) = part(in_square + e) + m*bodies%position(e, k)**2
             do d = 1, nd
-              part(in_product + 3*(e - 1) + d) = part(in_product + 3*(e - 1) + d) + m*bodies%velocity(d, k)*bodies%position(e, k)
+              part(in_product + 3*(e - 1) + d) = part(in_product + 3*(e - 1) + d) + m*v(d)*bodies%position(e, k)
             end do
           end do
         end associate

@@ -13,9 +13,10 @@
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
 !>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
-!>     s      mean over compliant contacts of h^2 k/m, with the stiffness k along the normal and the mass m that bodies have there
-!>            for each other, half of that of one of two equal grains. An error that is a part of what a load does to velocities in
-!>            a step changes forces by s times this part of the load. A load on springs counts 1/(1 + s) times.
+!>     s      mean over the contacts that bear something of h^2 k/m, at most 20 each, with the stiffness k along the normal of
+!>            compliant ones, 0 of rigid ones, and the mass m that bodies have there for each other, half of that of one of two
+!>            equal grains. An error that is a part of what a load does to velocities in a step changes forces by s times this part
+!>            of the load. A load on springs counts 1/(1 + s) times.
 !>     U      = max(U_q, 0.3 f own);  U_q = min(load, max(drive, creep)) where both are there, else the one that is there, else
 !>            stress; f = sqrt(1 - e^2), at least 0.05, where e is the largest coefficient of restitution
 !> Where there are bonds, U is at most max(U_q, 0.2 bonds), and 0.2 bonds is the load where there is no other. Bonds, and
@@ -31,6 +32,7 @@ module gravier_velocity_scale
   use gravier_boundary, only: boundary_t
   use gravier_boundary_levers, only: find_levers
   use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
@@ -68,7 +70,7 @@ module gravier_velocity_scale
     real(dp) :: diameter = 0.0_dp, mass = 0.0_dp
     !> simulated time [s]; 0: none
     real(dp) :: duration = 0.0_dp
-    !> largest coefficient of restitution of the laws; s of compliant contacts, 0 without any
+    !> largest coefficient of restitution of the laws; s, 0 without compliant contacts
     real(dp) :: restitution = 0.0_dp, stiffness = 0.0_dp
     !> the load is that of attractions, in the place of another one, and holds bodies together
     logical :: internal = .false.
@@ -78,6 +80,8 @@ module gravier_velocity_scale
     real(dp) :: quiet = 0.0_dp, share = 0.0_dp
     !> value that the user gives in the place of all rules; 0: none [m/s]
     real(dp) :: given = 0.0_dp
+    !> velocity of the observer: that which all boundaries have in common, or of the whole scene where there are none [m/s]
+    real(dp) :: frame(3) = 0.0_dp
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
     real(dp), allocatable :: lever(:)
   contains
@@ -138,7 +142,8 @@ contains
     real(dp), intent(in) :: area(:)
     type(imposed_motion_t) :: motion
     !> squares and number of attractions, of impulses where nothing loads or drives; number, masses and their squares of grains;
-    !> sum of h^2 k/m over compliant contacts and their number; mass, twice the energy and momentum of all bodies
+    !> sum of h^2 k/m over compliant contacts, number of contacts that bear something; mass, twice the energy and momentum of all
+    !> bodies
     real(dp) :: parts(11 + decomposition%nd, size(problem%sub)), sums(11 + decomposition%nd)
     real(dp) :: attraction
     logical :: idle
@@ -155,8 +160,7 @@ contains
       if (allocated(problem%sub(s)%attraction)) call add_attraction(problem%sub(s), parts(1:2, s))
       if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
       call add_masses(problem%sub(s), parts(5:7, s))
-      parts(8, s) = problem%sub(s)%stiffness
-      parts(9, s) = real(problem%sub(s)%n_springs, dp)
+      if (physics%laws%yields) call add_stiffness(problem%sub(s), parts(8:9, s))
       call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(10:, s))
       call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(10:, s))
     end do
@@ -184,6 +188,7 @@ contains
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call self%choose()
     if (.not. motion%bounded .and. sums(10) > 0.0_dp) motion%common(1:decomposition%nd) = sums(12:)/sums(10)
+    self%frame(:) = motion%common
     call set_concerns(self, physics, motion%common, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
@@ -208,6 +213,21 @@ contains
     sums(1) = sum(sub%impulse(:, 1, :)**2)
     sums(2) = real(count(sub%impulse(:, 1, :) > 0.0_dp), dp)
   end subroutine add_impulses
+
+  !> The sum of h^2 k/m over the compliant contacts that are pressed together, and the number of these and of rigid ones that the
+  !> step starts with an impulse.
+  pure subroutine add_stiffness(sub, sums)
+    type(subproblem_t), intent(in) :: sub
+    real(dp), intent(inout) :: sums(2)
+    integer :: c
+
+    sums(1) = sub%stiffness
+    sums(2) = real(sub%n_springs, dp)
+    do c = 1, sub%n_contacts
+      if (sub%yields(c)) cycle
+      if (sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp) sums(2) = sums(2) + 1.0_dp
+    end do
+  end subroutine add_stiffness
 
   !> Number, mass and squared masses of the grains. One that several subdomains share counts in equal parts.
   pure subroutine add_masses(sub, sums)
@@ -432,7 +452,10 @@ contains
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"
     end if
-    self%quiet = merge(0.0_dp, self%value, self%internal .and. .not. self%drive > 0.0_dp)
+    ! beside moving bodies loads count as without springs
+    self%quiet = self%value
+    if (self%kind == "load on springs") self%quiet = self%load
+    if (self%internal .and. .not. self%drive > 0.0_dp) self%quiet = 0.0_dp
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
       self%value = self%share*self%own

@@ -224,25 +224,25 @@ contains
     solve%velocity_error = 0.02_dp
     solve%velocity_scale = 0.1_dp
     solve%residual = 2e-2_dp
-    call tally%add_solve(solve, "load of a step", 0.5_dp)
+    call tally%add_solve(solve, "load of a step")
     ! reached another criterion: out of the accuracy, then too soon to tell, twice
     solve%accurate = .false.
-    call tally%add_solve(solve, "load of a step", 0.5_dp)
+    call tally%add_solve(solve, "load of a step")
     solve%judged = .false.
-    call tally%add_solve(solve, "load of a step", 0.5_dp)
-    call tally%add_solve(solve, "load of a step", 0.5_dp)
+    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step")
     ! a pass over layers that the solve went on from, then one that it did not
     solve%layered_sweeps = 1.5_dp
     solve%layered = .true.
     solve%status = solve_stagnated
     solve%velocity_error = 0.06_dp
     solve%residual = 1e-2_dp
-    call tally%add_solve(solve, "load of a step", 0.5_dp)
+    call tally%add_solve(solve, "load of a step")
     solve%layered = .false.
     solve%status = solve_diverged
     solve%velocity_error = 1e9_dp
     solve%velocity_scale = 0.4_dp
-    call tally%add_solve(solve, "speeds", 0.5_dp)
+    call tally%add_solve(solve, "speeds")
     call check_equal(int(tally%solves), 6, "solves")
     call check_equal(int(tally%inaccurate), 1, "out of the accuracy")
     call check_equal(int(tally%unjudged), 2, "ended too soon to tell")
