@@ -73,7 +73,7 @@ contains
     if (present(status)) solve%status = status
     solve%velocity_error = error
     impulses(:, :) = 1.0_dp
-    impulses(:, 1) = 0.0_dp
+    if (size(impulses, 2) > 0) impulses(:, 1) = 0.0_dp
     scale%own = own
     if (present(frame)) scale%frame(1) = frame
     call drift%note(sim%decomposition, sim%physics, impulses, sim%mass, scale, solve)

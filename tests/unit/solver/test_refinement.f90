@@ -163,7 +163,7 @@ contains
 
     call prepare(sim, control)
     speed = sim%problem%sub(1)%v_global(2, 1)
-    allocate (method, source=scaling_t(factor=1.0e30_dp))
+    allocate (method, source=scaling_t(factor=1.0e3_dp))
     call solve(refinement, sim, method, control, 1.0e-10_dp, report, error)
     call check(report%status == solve_converged .or. report%status == solve_exhausted, "diverged: it begins anew")
     call check_equal(int(refinement%reached), 0, "diverged: not reached")
