@@ -21,8 +21,10 @@ contains
 
     text = error_line(simulation)//scale_range_line(simulation%tally)//drift_lines(simulation)//overlap_lines(simulation)// &
       & layer_line(simulation%tally)//creep_lines(simulation%tally)
-    if (simulation%restarted) text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)// &
-      & " steps since the restart"//newline
+    if (.not. simulation%restarted) return
+    text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)//" steps since the restart"
+    if (drifts(simulation)) text = text//"; `drift` is of all steps"
+    text = text//newline
   end function accuracy_lines
 
   !> What a solve has to reach, in a word.

@@ -26,7 +26,7 @@ module gravier_scale_report
   real(dp), parameter :: most_relative_step = 0.1_dp
   !> fraction of the speed of a wall that errors may have in slow shear
   real(dp), parameter :: error_share = 0.05_dp
-  !> what numbers of so many digits may be off by: a mass that is advised is enough
+  !> relative rounding of a number that is written with `digits` digits: no warning comes for the mass that one has advised
   real(dp), parameter :: of_digits = 5.0e-3_dp
   !> part of the period of an oscillation that a step may take
   real(dp), parameter :: most_of_period = 0.1_dp

@@ -124,19 +124,13 @@ contains
 
     first = report
     report = second
-    report%iterations = first%iterations + second%iterations
-    report%seconds = first%seconds + second%seconds
-    report%start_seconds = first%start_seconds
-    report%layered = first%layered
-    report%layered_sweeps = first%layered_sweeps
-    call report%history%follow(first%history, first%iterations)
+    call report%follow(first)
     ! it tells nothing about the first method
     report%figure_ratio = 0.0_dp
     if (report%status /= solve_converged .and. report%status /= solve_unbounded) then
       report%status = first%status
       report%creep = first%creep
     end if
-    if (allocated(first%trace)) call report%follow_trace(first)
   end subroutine join
 
   pure subroutine fallback_get_state(self, words)

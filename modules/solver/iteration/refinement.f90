@@ -94,7 +94,7 @@ contains
     further%max_iterations = control%max_iterations - first%iterations
     call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return
-    call join(report, first)
+    call report%follow(first)
     ! both are one solve
     method%work%solves = method%work%solves - 1
   end subroutine refinement_solve
@@ -134,21 +134,6 @@ contains
     if (problem%cell%is_driven) call respond(problem)
     call problem%evaluate()
   end subroutine attempt
-
-  !> The report of a solve that went on from an attempt, as of both together.
-  pure subroutine join(report, first)
-    !> of the second; then of both
-    type(solve_report_t), intent(inout) :: report
-    type(solve_report_t), intent(in) :: first
-
-    if (allocated(first%trace)) call report%follow_trace(first)
-    call report%history%follow(first%history, first%iterations)
-    report%iterations = first%iterations + report%iterations
-    report%seconds = first%seconds + report%seconds
-    report%start_seconds = first%start_seconds
-    report%layered = report%layered .or. first%layered
-    report%layered_sweeps = report%layered_sweeps + first%layered_sweeps
-  end subroutine join
 
   pure subroutine refinement_get_state(self, words)
     class(refinement_t), intent(in) :: self

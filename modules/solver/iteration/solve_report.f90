@@ -91,7 +91,7 @@ module gravier_solve_report
     real(dp), allocatable :: trace(:, :)
   contains
     procedure :: keep_trace => solve_report_keep_trace
-    procedure :: follow_trace => solve_report_follow_trace
+    procedure :: follow => solve_report_follow
   end type solve_report_t
 
   !> Who is told how a solve goes on.
@@ -135,8 +135,23 @@ contains
     end associate
   end subroutine solve_report_keep_trace
 
-  !> Put the trace of the solve that this one went on from before its own: iterations and seconds go on.
-  pure subroutine solve_report_follow_trace(self, first)
+  !> Make the report of a solve that went on from another one that of both together. It ends as it has ended; iterations, seconds,
+  !> passes over layers, history and trace are those of both.
+  pure subroutine solve_report_follow(self, first)
+    class(solve_report_t), intent(inout) :: self
+    type(solve_report_t), intent(in) :: first
+
+    if (allocated(first%trace)) call follow_trace(self, first)
+    call self%history%follow(first%history, first%iterations)
+    self%iterations = first%iterations + self%iterations
+    self%seconds = first%seconds + self%seconds
+    self%start_seconds = first%start_seconds
+    self%layered = first%layered .or. self%layered
+    self%layered_sweeps = first%layered_sweeps + self%layered_sweeps
+  end subroutine solve_report_follow
+
+  !> Put the trace of the first solve before that of the second, whose iterations and seconds go on.
+  pure subroutine follow_trace(self, first)
     class(solve_report_t), intent(inout) :: self
     type(solve_report_t), intent(in) :: first
     real(dp), allocatable :: both(:, :)
@@ -150,6 +165,6 @@ contains
     both(6, n + 1:) = both(6, n + 1:) + first%seconds
     self%n_trace = n + self%n_trace
     call move_alloc(both, self%trace)
-  end subroutine solve_report_follow_trace
+  end subroutine follow_trace
 
 end module gravier_solve_report

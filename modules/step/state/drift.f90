@@ -56,9 +56,8 @@ contains
     drift_words = 1 + 9*(of_cell + n_boundaries)
   end function drift_words
 
-  !> Add the ways of a step that has ended, if its motion is not told from the error of its solve, which has
-  !> converged. All velocities are those about
-  !> what all boundaries have in common. Collective.
+  !> Add the ways of a step that has ended, if its solve has converged and its motion is not told from the error of the solve. All
+  !> velocities are relative to what all boundaries have in common. Collective.
   subroutine drift_note(self, decomposition, physics, impulses, mass, scale, solve)
     class(drift_t), intent(inout) :: self
     !> with the velocities of the end of the step

@@ -58,8 +58,9 @@ module gravier_velocity_scale
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> s from which on the kind of a load names springs
   real(dp), parameter :: much_stiffer = 0.1_dp
-  !> the kinds of U where it is the motion that goes on, and where bonds limit that
-  character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds"
+  !> the kinds of U where it is the motion that goes on, where bonds limit that, and where loads press springs
+  character(len=*), parameter :: of_motion = "motion of the bodies", of_bonds = "strength of bonds", &
+    & of_springs = "load on springs"
 
   type :: velocity_scale_t
     !> what can be meant by the velocity of a scene, and which velocity counts [m/s]
@@ -440,7 +441,7 @@ contains
     load = self%load/(1.0_dp + self%stiffness)
     self%value = load
     self%kind = "load of a step"
-    if (self%stiffness > much_stiffer) self%kind = "load on springs"
+    if (self%stiffness > much_stiffer) self%kind = of_springs
     if (.not. self%load > 0.0_dp) self%kind = "none"
     if (.not. (self%load > 0.0_dp .or. self%drive > 0.0_dp) .and. self%own < little_motion*self%stress) then
       self%value = self%stress/(1.0_dp + self%stiffness)
@@ -454,7 +455,7 @@ contains
     end if
     ! beside moving bodies loads count as without springs
     self%quiet = self%value
-    if (self%kind == "load on springs") self%quiet = self%load
+    if (self%kind == of_springs) self%quiet = self%load
     if (self%internal .and. .not. self%drive > 0.0_dp) self%quiet = 0.0_dp
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
