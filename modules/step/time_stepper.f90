@@ -11,7 +11,7 @@ module gravier_time_stepper
   use gravier_convergence_history, only: effort_t
   use gravier_backoff, only: backoff_t
   use gravier_solve, only: solve_contacts
-  use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged, solve_unbounded
+  use gravier_solve_report, only: solve_control_t, solve_watch_t, exact_solution_t, solve_converged, solve_diverged
   use gravier_fallback, only: fallback_t
   use gravier_refinement, only: refinement_t
   use gravier_decomposition, only: decomposition_t
@@ -45,7 +45,8 @@ module gravier_time_stepper
   use gravier_diagnostic, only: solved_step_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_grain_balance, only: grain_balance_t
-  use gravier_failed_contact, only: find_divergence, find_largest_impulse
+  use gravier_failed_contact, only: find_cause
+  use gravier_spot_checks, only: spot_checks_t
   use gravier_step_figures, only: step_figures_t
   use gravier_run_tally, only: run_tally_t
   use gravier_population, only: population_t
@@ -93,8 +94,7 @@ module gravier_time_stepper
     type(backoff_t) :: pass_backoff
     !> what the last solve tells the next one about when to check
     real(dp) :: figure_ratio = 0.0_dp
-    !> where it is known
-    class(exact_solution_t), allocatable :: exact
+    class(exact_solution_t), allocatable :: exact ! where it is known
     ! ---- the present step
     !> what is solved; where it is shown, after the step, of all contacts
     type(contact_problem_t) :: problem
@@ -137,6 +137,7 @@ module gravier_time_stepper
     real(dp) :: rest_energy = 0.0_dp
     !> motion that is not told from errors of solves
     type(drift_t) :: drift
+    type(spot_checks_t) :: spot_checks
     !> since this run began or went on from a checkpoint: what solves took
     type(effort_t) :: effort
     !> how solves ended and what was mended, since this run began or went on from a checkpoint
@@ -166,6 +167,8 @@ contains
     if (allocated(error)) return
     call self%assemble(figures)
     call solve(self, figures, error, watch)
+    if (.not. self%refinement%aims) call self%spot_checks%look(self%decomposition, self%problem, self%method, self%control, &
+      & figures%solve, error)
     call note_solve(self, figures, error)
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
@@ -393,15 +396,11 @@ contains
 
     if (allocated(error)) return
     associate (solve => figures%solve)
-      if (solve%status /= solve_converged) self%failed = self%failed + 1
+      if (solve%status /= solve_converged .or. solve%refuted) self%failed = self%failed + 1
       call self%tally%add_solve(solve, self%velocity_scale%kind)
       self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
-      if (solve%status == solve_diverged) then
-        call find_divergence(self%problem, figures%cause)
-        return
-      end if
-      if (solve%status == solve_unbounded) call find_largest_impulse(self%problem, figures%cause)
+      call find_cause(self%problem, solve%status, figures%cause)
     end associate
   end subroutine note_solve
 
@@ -490,6 +489,7 @@ contains
     self%resting = resting_t()
     self%is_whole = .true.
     self%drift = drift_t()
+    self%spot_checks = spot_checks_t()
     self%refinement = refinement_t()
     self%effort = effort_t()
     self%tally = run_tally_t()

@@ -308,6 +308,10 @@ contains
                   "'none' where relaxation is given: acceleration needs a factor that adapts itself")
       call expect(report, solver%velocity_scale > 0.0_dp .or. .not. solver%velocity_scale_given, "solver", "velocity_scale", &
                   error)
+      call expect(report, solver%spot_checks >= 0.0_dp .and. solver%spot_checks <= 1.0_dp, "solver", "spot_checks", error)
+      call expect(report, solver%criterion == "velocity_error" .or. .not. solver%spot_checks_given .or. &
+                  .not. solver%spot_checks > 0.0_dp, "solver", "spot_checks", error, &
+                  "0 unless criterion = 'velocity_error', whose estimates the checks are about")
       call expect(report, solver%check_every >= 1, "solver", "check_every", error)
       call expect(report, solver%warm_start .or. .not. solver%sleeping, "solver", "sleeping", error, &
                   ".false. where warm_start = .false.: bodies that sleep keep their impulses from step to step")

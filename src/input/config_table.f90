@@ -272,6 +272,9 @@ module gravier_config_table
            note="by the method"), &
      key_t("solver", "velocity_scale", kind_real, "-1", "> 0", "velocity against which errors of a solve are compared", &
            unit="m/s", note="by rule"), &
+     key_t("solver", "spot_checks", kind_real, "0.05", "in [0, 1]", &
+           "part of the iterations that goes to comparisons of solves with ones of a tenth of the `accuracy`, "// &
+           "which the closing lines sum up", note="0.05 with `velocity_error`, else none"), &
      key_t("solver", "check_every", kind_integer, "10", ">= 1", "iterations between two evaluations of the criterion"), &
      key_t("solver", "warm_start", kind_logical, ".true.", "", "start from the impulses of the previous step"), &
      key_t("solver", "layered_start", kind_logical, ".true.", "", &

@@ -129,6 +129,9 @@ module gravier_config_types
     real(dp) :: velocity_scale
     !> false: the velocity is found by rule
     logical :: velocity_scale_given = .false.
+    !> part of the iterations that go to comparisons of solves with more exact ones
+    real(dp) :: spot_checks
+    logical :: spot_checks_given = .false.
     !> none or momentum
     character(len=choice_length) :: acceleration
     logical :: warm_start

@@ -4,11 +4,12 @@ module gravier_accuracy_lines
   use gravier_text, only: to_text, counted
   use gravier_run_tally, only: run_tally_t
   use gravier_drift, only: most_drift
+  use gravier_spot_checks, only: checked_share
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: accuracy_lines, error_line, scale_range_line, drift_lines, drifts, overlap_lines, layer_line, creep_lines, &
-    & goal_name, goal_text, mean_size_name, percent, plain
+  public :: accuracy_lines, error_line, scale_range_line, spot_check_lines, drift_lines, drifts, overlap_lines, layer_line, &
+    & creep_lines, goal_name, goal_text, mean_size_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
 
@@ -19,8 +20,8 @@ contains
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
 
-    text = error_line(simulation)//scale_range_line(simulation%tally)//drift_lines(simulation)//overlap_lines(simulation)// &
-      & layer_line(simulation%tally)//creep_lines(simulation%tally)
+    text = error_line(simulation)//scale_range_line(simulation%tally)//spot_check_lines(simulation)//drift_lines(simulation)// &
+      & overlap_lines(simulation)//layer_line(simulation%tally)//creep_lines(simulation%tally)
     if (.not. simulation%restarted) return
     text = text//indent//"these lines are of the "//to_text(simulation%tally%solves)//" steps since the restart"
     if (drifts(simulation)) text = text//"; `drift` is of all steps"
@@ -83,6 +84,60 @@ contains
     end do
     text = text//newline
   end function scale_range_line
+
+  !> What spot checks have found of the velocities and forces of single steps; nothing where there was none.
+  function spot_check_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = ""
+    associate (checks => simulation%spot_checks, effort => simulation%effort)
+      if (checks%made == 0) return
+      text = "checked     "//counted(checks%made, "solve")//" by going on to the "//goal_text(simulation, checked_share)// &
+        & " and back, in "//percent(real(checks%further, dp)/real(max(effort%iterations, 1_i8), dp))//" more iterations"
+      if (checks%reached < checks%made) text = text//"; "//to_text(checks%reached)//" of them reached it"
+      text = text//newline
+      if (checks%reached == 0) return
+      text = text//indent//"velocities were off by "//to_text(checks%mean(checks%found), 2)// &
+        & " of U, root mean square, and by their estimates "//to_text(checks%mean(checks%estimated), 2)//newline
+      text = text//indent//"forces of a single step were off by "//percent(checks%contacts%share())//" at contacts, "// &
+        & percent(checks%stress%share())//" in the mean stress"//boundary_text(simulation)//newline
+    end associate
+  end function spot_check_lines
+
+  !> How far forces on boundaries are off in single steps: on that where they are off most and on that where they are off least.
+  function boundary_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    integer :: b, n, worst, best
+
+    text = ""
+    n = 0
+    associate (checks => simulation%spot_checks%boundary)
+      do b = 1, size(checks)
+        if (.not. checks(b)%whole > 0.0_dp) cycle
+        n = n + 1
+        if (n == 1) then
+          worst = b
+          best = b
+        end if
+        if (checks(b)%share() > checks(worst)%share()) worst = b
+        if (checks(b)%share() < checks(best)%share()) best = b
+      end do
+      if (n > 0) text = ", "//percent(checks(worst)%share())//" on "//name_of(worst)
+      if (n > 1) text = text//", "//percent(checks(best)%share())//" on "//name_of(best)
+      if (n > 2) text = text//", on others between these"
+    end associate
+
+  contains
+
+    function name_of(boundary) result(name)
+      integer, intent(in) :: boundary
+      character(len=:), allocatable :: name
+      name = "'"//trim(simulation%decomposition%boundaries(boundary)%name)//"'"
+    end function name_of
+
+  end function boundary_text
 
   !> Whether the scene has moved visibly, as a whole, in steps whose motion is not told from the errors of their solves.
   pure logical function drifts(simulation)

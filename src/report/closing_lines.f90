@@ -17,6 +17,8 @@ module gravier_closing_lines
   public :: phase_lines, work_lines, cost_lines, summary_lines
 
   character(len=*), parameter :: newline = new_line("a")
+  !> spot checks that are enough to tell what a tenth of the error takes
+  integer, parameter :: enough_checks = 4
 
 contains
 
@@ -119,8 +121,13 @@ contains
       call effort%looser_range(least, most)
       text = text//"            at "//goal_text(simulation, 10.0_dp)//": "//estimate_text(comm, effort, least, most)
       if (effort%unreached(tenfold) > 0) text = text//": "//counted(effort%unreached(tenfold), "solve")//" did not reach it"
+      text = text//newline//"            at "//goal_text(simulation, 0.1_dp)//": "
+      if (simulation%spot_checks%made >= enough_checks) then
+        text = text//checked_text(comm, simulation)//newline
+        return
+      end if
       call effort%tighter_range(least, most)
-      text = text//newline//"            at "//goal_text(simulation, 0.1_dp)//": "//estimate_text(comm, effort, least, most)
+      text = text//estimate_text(comm, effort, least, most)
       if (simulation%failed > 0) then
         text = text//": "//counted(int(simulation%failed, i8), "solve")//" did not reach the "//goal_name(simulation)//" itself"
       else if (least < 0.0_dp) then
@@ -167,6 +174,22 @@ contains
     text = to_text(nint(least, i8))//" to "//to_text(nint(most, i8))//" iterations, "//to_text(seconds(1), 2)//" to "// &
       & to_text(seconds(2), 2)//" s (estimated)"
   end function estimate_text
+
+  !> What a tenth of the error would have taken, by the solves that were continued to it. Collective.
+  function checked_text(comm, simulation) result(text)
+    type(communicator_t), intent(in) :: comm
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    real(dp) :: iterations
+
+    associate (checks => simulation%spot_checks, effort => simulation%effort)
+      iterations = checks%times()*real(effort%iterations, dp)
+      text = "about "//to_text(iterations, 2)//" iterations, "//to_text(comm%highest(effort%seconds_of(iterations)), 2)// &
+        & " s, by "//counted(checks%made, "solve")//" continued to it"
+      if (checks%reached < checks%made) text = text//", or more: "//counted(checks%made - checks%reached, "check")// &
+        & trim(merge(" was ", " were", checks%made - checks%reached == 1))//" given up"
+    end associate
+  end function checked_text
 
   !> In words, for a person: convergence and time; nothing of a run without a solve. Collective.
   function summary_lines(comm, simulation, phases, seconds) result(text)

@@ -77,6 +77,8 @@ contains
     associate (tally => simulation%tally, solver => simulation%config%solver, fallback => simulation%fallback)
       if (tally%missed() == 0) then
         text = "the solves that missed it were made before the restart"
+      else if (2*tally%refuted > tally%missed()) then
+        text = "a smaller &solver accuracy: the estimates that end solves are too small in this scene"
       else if (misses_residual_only(simulation) .or. (goal_name(simulation) == "tolerance" .and. &
         & tally%worst_error <= solver%accuracy .and. tally%unbounded + tally%diverged == 0)) then
         text = "velocities are within the accuracy "//to_text(solver%accuracy, 3)//": a larger &solver tolerance, now "// &
@@ -135,6 +137,7 @@ contains
     associate (tally => simulation%tally)
       text = ""
       if (simulation%failed > tally%missed()) text = ", "//to_text(simulation%failed - tally%missed())//" missed before the restart"
+      call add(tally%refuted, "found wrong by spot checks")
       call add(tally%stagnated, "stagnated")
       call add(tally%unbounded, "found no solution")
       call add(tally%exhausted, "ended at max_iterations")

@@ -322,6 +322,7 @@ contains
       self%control%max_iterations = config%solver%max_iterations
       self%control%check_every = config%solver%check_every
       self%control%trace = config%output%trace
+      self%spot_checks%part = config%solver%spot_checks
       self%written_steps = schedule_t(every=config%output%every, last=config%time%steps)
       self%dumped_step = config%output%fclib_step
       if (config%scene%bodies == "column") allocate (self%exact, source=column_solution_t(config%scene%column_count, &

@@ -6,11 +6,23 @@ module gravier_failed_contact
   use gravier_finite, only: has_finite_square
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_solve_report, only: solve_diverged, solve_unbounded
   implicit none
   private
-  public :: find_divergence, find_largest_impulse
+  public :: find_cause, find_divergence, find_largest_impulse
 
 contains
+
+  !> Where a solve has failed that ended so; not allocated after other ends. Collective.
+  subroutine find_cause(problem, status, cause)
+    type(contact_problem_t), intent(in) :: problem
+    !> of the report of the solve
+    integer, intent(in) :: status
+    character(len=:), allocatable, intent(inout) :: cause
+
+    if (status == solve_diverged) call find_divergence(problem, cause)
+    if (status == solve_unbounded) call find_largest_impulse(problem, cause)
+  end subroutine find_cause
 
   !> After a solve that diverged: the first contact, in the order of the subdomains, whose impulse or velocities are not finite or
   !> have squares that are not. Collective.

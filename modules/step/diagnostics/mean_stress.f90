@@ -9,7 +9,7 @@ module gravier_mean_stress
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
-  public :: mean_stress_t
+  public :: mean_stress_t, sum_moments
 
   !> The same on every rank.
   type, extends(diagnostic_t) :: mean_stress_t
@@ -71,31 +71,47 @@ contains
     type(contact_problem_t), intent(in) :: problem
     !> [s]
     real(dp), intent(in) :: h
-    real(dp) :: parts(decomposition%nd**2 + 1, size(problem%sub)), sums(decomposition%nd**2 + 1)
+    real(dp) :: parts(1, size(problem%sub)), filled(1)
     real(dp), dimension(decomposition%nd) :: low, high, length
+    real(dp), allocatable :: moments(:)
     integer :: s, k, nd
 
     nd = decomposition%nd
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      call add_contacts(problem, s, parts(1:nd**2, s))
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
-          parts(nd**2 + 1, s) = parts(nd**2 + 1, s) + decomposition%figures%volume_of(owned, k)
+          parts(1, s) = parts(1, s) + decomposition%figures%volume_of(owned, k)
         end do
       end associate
     end do
-    call decomposition%comm%sum_parts(parts, sums)
+    call decomposition%comm%sum_parts(parts, filled)
+    call sum_moments(problem, moments)
     call find_extent(decomposition, low, high, length)
     self%volume = product(length)
     do k = 1, nd
-      self%stress(:, k) = sums((k - 1)*nd + 1:k*nd)
+      self%stress(:, k) = moments((k - 1)*nd + 1:k*nd)
     end do
-    self%solid_fraction = sums(nd**2 + 1)
+    self%solid_fraction = filled(1)
     if (.not. self%volume > 0.0_dp) return
     self%stress(:, :) = self%stress/(h*self%volume)
     self%solid_fraction = self%solid_fraction/self%volume
   end subroutine measure_stress
+
+  !> Sum of p l^T over all contacts, column by column (nd**2) [N m s]. Collective.
+  subroutine sum_moments(problem, moments)
+    type(contact_problem_t), intent(in) :: problem
+    real(dp), allocatable, intent(out) :: moments(:)
+    real(dp) :: parts(problem%kernels%nd**2, size(problem%sub))
+    integer :: s
+
+    allocate (moments(problem%kernels%nd**2))
+    parts(:, :) = 0.0_dp
+    do s = 1, size(problem%sub)
+      call add_contacts(problem, s, parts(:, s))
+    end do
+    call problem%comm%sum_parts(parts, moments)
+  end subroutine sum_moments
 
   !> Add p l^T of the contacts of a subdomain, column by column.
   pure subroutine add_contacts(problem, s, part)

@@ -320,6 +320,8 @@ contains
     call check_close(config%solver%relaxation, 1.0_dp, 0.0_dp, "default relaxation")
     call check_equal(config%solver%check_every, 10, "default check_every")
     call check(.not. config%solver%velocity_scale_given, "default velocity_scale is found by rule")
+    call check_close(config%solver%spot_checks, 0.05_dp, 0.0_dp, "default spot_checks")
+    call check(.not. config%solver%spot_checks_given, "default spot_checks")
     call check(config%solver%warm_start, "default warm_start")
     call check_equal(config%solver%on_failure, "continue", "default on_failure")
     call check_equal(config%decomposition%partition, "grid", "default partition")
@@ -845,6 +847,7 @@ contains
     call refuse(scene("bodies = 'column' gravity_table = 'g.csv' gravity = 0, -1"), &
       "&scene gravity = 0, -1: expected none where gravity_table = 'g.csv' replaces it")
     call refuse(column // "&solver check_every = 0 /", "&solver check_every = 0: expected an integer >= 1")
+    call refuse(column // "&solver spot_checks = -0.1 /", "&solver spot_checks = -0.1: expected a finite real number in [0, 1]")
     call refuse(column // "&solver velocity_scale = 0 /", "&solver velocity_scale = 0: " // positive // " (m/s)")
   end subroutine test_rules_of_time_and_solver
 

@@ -3,7 +3,8 @@ program test_run_summary
   use gravier_kinds, only: dp
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_timers, only: n_phases, phase_factorise, phase_interface_solve, phase_neighbourhood, phase_output
-  use gravier_run_summary, only: halving_text
+  use gravier_run_summary, only: halving_text, converged_text, mending_text
+  use gravier_solve_report, only: solve_report_t, solve_converged
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, finish_checks
@@ -18,6 +19,7 @@ program test_run_summary
   call comm%init()
   call test_output()
   call test_newton()
+  call test_refuted()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -50,6 +52,26 @@ contains
     call check(.not. says(simulation, [phase_factorise, phase_interface_solve], "kind = 'elastic'"), "contacts that yield already")
     call simulation%free()
   end subroutine test_newton
+
+  !> Solves that converged by their estimate, and that spot checks have found wrong: they have missed the accuracy.
+  subroutine test_refuted()
+    type(simulation_t) :: simulation
+    type(solve_report_t) :: solve
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 2 /", simulation)
+    solve%status = solve_converged
+    call simulation%tally%add_solve(solve, "load of a step")
+    solve%refuted = .true.
+    call simulation%tally%add_solve(solve, "load of a step")
+    simulation%failed = 1
+    simulation%step = 2
+    call check(index(converged_text(simulation), "NO: 1 of 2 solves did not reach the accuracy") == 1, "one of two has missed it")
+    call check(index(converged_text(simulation), "; 1 found wrong by spot checks") > 0, "how it is known")
+    call check(index(mending_text(simulation), "a smaller &solver accuracy") == 1, "what mends it")
+    simulation%tally%stagnated = 1
+    call check(index(mending_text(simulation), "a smaller &solver accuracy") == 0, "most of those that missed it did not")
+    call simulation%free()
+  end subroutine test_refuted
 
   !> Whether the advice has some words where these phases together take nine tenths of the time.
   logical function says(simulation, dear, words)
