@@ -353,6 +353,32 @@ class Diagnostics(RunTestCase):
                     self.assertEqual(results["/steps/2/diagnostics@pressure"], history["pressure"][-1])
                     self.assertNotIn("/steps/0/diagnostics", results)
 
+    def test_inside_a_drum(self):
+        """Seven disks in a circle fill 7 (R/R_c)^2 of it. A force on a lid over one sphere in a cylinder makes a mean stress of the force over the
+        cross-section, in all of the scene and in a region of half of its height; of the half of its width, half of the volume."""
+        angles = np.arange(6) * np.pi / 3
+        seven = np.vstack([[0.0, 0.0], 2 * RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+        circle = {"name": "ring", "shape": "circle", "radius": 3.01 * RADIUS}
+        case = {"scene": {"bodies": "file", "bodies_file": grains_csv(self.here("seven.csv"), seven), "gravity": [0.0, 0.0]},
+                "time": {"step": 1e-3, "steps": 1}}
+        history = self.run_here("circle", merged(case, ALL), [circle]).history()
+        np.testing.assert_allclose(history["solid_fraction"], 7 / 3.01**2, rtol=1e-13)
+        np.testing.assert_allclose(history["volume"], np.pi * (3.01 * RADIUS)**2, rtol=1e-13)
+        path, force, wide = grains_csv(self.here("one.csv"), [[0.0, 0.0, RADIUS]]), 10.0, 5 * RADIUS
+        boundaries = [plane("floor", 2, 1, 0.0), plane("lid", 2, -1, 2 * RADIUS, free=[False, False, True], force=[0.0, 0.0, -force], mass=0.1),
+                      {"name": "tube", "shape": "cylinder", "radius": wide, "axis": [0.0, 0.0, 1.0]}]
+        case = {"scene": {"dimension": 3, "bodies": "file", "bodies_file": path, "gravity": [0.0] * 3}, "time": {"step": 1e-3, "steps": 1},
+                "solver": {"tolerance": 1e-12, "accuracy": 1e-10},
+                "region": {"name": "half", "upper": [1e30, 1e30, RADIUS], "axis": "x", "bins": 2}}
+        run = self.run_here("cylinder", merged(case, ALL), boundaries)
+        history = run.history()
+        np.testing.assert_allclose(history["stress_zz"], force / (np.pi * wide**2), rtol=1e-9)
+        np.testing.assert_allclose(history["volume"], np.pi * wide**2 * 2 * RADIUS, rtol=1e-13)
+        np.testing.assert_allclose(history["half_stress_zz"], force / (np.pi * wide**2), rtol=1e-9)
+        np.testing.assert_allclose(history["half_volume"], np.pi * wide**2 * RADIUS, rtol=1e-13)
+        pressure = re.search(r"pressure P = (\S+) Pa", gravier("--check", "case.nml", directory=run.directory).stdout)
+        self.assertAlmostEqual(float(pressure[1]) * np.pi * wide**2 / force, 1.0, delta=5e-3)
+
     def test_sticking_and_flying(self):
         """A disk at rest on a slope of less than the angle of friction does not slide when it must not turn; another flies."""
         path = grains_csv(self.here("stick.csv"), [[0.0, RADIUS], [0.0, 10 * RADIUS], [0.0, 20 * RADIUS]])

@@ -71,6 +71,8 @@ module gravier_surface
     procedure :: stretch => surface_stretch
     procedure :: way => surface_way
     procedure :: own_area => surface_own_area
+    procedure :: share_inside => surface_share_inside
+    procedure :: shut => surface_shut
     procedure :: level => surface_level
     procedure :: support => surface_support
   end type surface_t
@@ -288,6 +290,29 @@ contains
     class(surface_t), intent(in) :: self
     area = norm2(self%edge(:, 1))
   end function surface_own_area
+
+  !> The share of a box that is inside the surface: all of it where the surface does not enclose.
+  pure real(dp) function surface_share_inside(self, low, high) result(share)
+    class(surface_t), intent(in) :: self
+    !> corners (3) [m]
+    real(dp), intent(in) :: low(3), high(3)
+
+    share = 1.0_dp
+    ! the box and the surface do not matter to one that does not enclose
+    associate (unused => low(1) + high(1) + self%radius)
+    end associate
+  end function surface_share_inside
+
+  !> Make a box along an axis no larger than the surface that encloses it; as it is where the surface does not enclose.
+  pure subroutine surface_shut(self, axis, low, high)
+    class(surface_t), intent(in) :: self
+    integer, intent(in) :: axis
+    !> [m]
+    real(dp), intent(inout) :: low, high
+
+    associate (unused => self%point(axis) + low + high)
+    end associate
+  end subroutine surface_shut
 
   !> Where the surface stands along an axis, if it faces along it.
   pure subroutine surface_level(self, axis, level, known)

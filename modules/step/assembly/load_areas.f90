@@ -4,7 +4,7 @@ module gravier_load_areas
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_facing_planes, only: find_facing_planes, is_pressed
   use gravier_decomposition, only: decomposition_t
-  use gravier_scene_extent, only: find_extent
+  use gravier_scene_extent, only: find_extent, share_inside
   implicit none
   private
   public :: facing_area, find_load_areas, check_load_areas
@@ -71,7 +71,8 @@ contains
   end function area_across
 
   !> Areas that the loads on boundaries work on. Where a scene is open across a load, or shut in by other boundaries than planes,
-  !> its grains tell how far it goes: at least as far as the load works. Collective.
+  !> its grains tell how far it goes: at least as far as the load works. Of a circle or a cylinder it fills what these leave of it.
+  !> Collective.
   subroutine find_load_areas(decomposition, area)
     type(decomposition_t), intent(in) :: decomposition
     !> (boundaries) [m^2, m in 2D]; 0 where no force moves the boundary, and where there is no grain
@@ -89,7 +90,7 @@ contains
       if (area(b) > 0.0_dp .or. known) cycle
       call find_extent(decomposition, low, high, extent)
       known = .true.
-      area(b) = load_area(decomposition, b, extent)
+      area(b) = load_area(decomposition, b, extent)*share_inside(decomposition%boundaries, low, high)
     end do
   end subroutine find_load_areas
 

@@ -1,20 +1,22 @@
-!> The space that a scene takes along the axes.
+!> The space that a scene takes along the axes, and within boundaries that enclose it.
 module gravier_scene_extent
   use gravier_kinds, only: dp
   use gravier_orientation, only: orientation_matrix
   use gravier_shape_library, only: shape_library_t
   use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: find_extent
+  public :: find_extent, share_inside
 
 contains
 
   !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that shut
-  !> it in, with the outermost points of the grains in the place of planes that are not there. Planes that have turned count where
-  !> they are at the middle of the other axes. No length where neither planes nor grains bound it. Collective.
+  !> it in. In the place of planes that are not there it ends where a circle or a cylinder along an axis ends that encloses it, and
+  !> otherwise at the outermost points of the grains. Planes that have turned count where they are at the middle of the other axes.
+  !> No length where nothing bounds it. Collective.
   subroutine find_extent(decomposition, low, high, length)
     type(decomposition_t), intent(in) :: decomposition
     !> (nd) [m]
@@ -52,6 +54,7 @@ contains
         cycle
       end if
       call find_facing_planes(decomposition%boundaries, d, middle, low(d), high(d))
+      call shut(decomposition%boundaries, d, low(d), high(d))
       if (.not. low(d) > -huge(1.0_dp)) low(d) = min(-extremes(d), high(d))
       if (.not. high(d) < huge(1.0_dp)) high(d) = max(extremes(nd + d), low(d))
       ! neither planes nor grains
@@ -60,6 +63,38 @@ contains
       length(d) = max(high(d) - low(d), 0.0_dp)
     end do
   end subroutine find_extent
+
+  !> No farther along an axis than the boundaries that enclose grains.
+  pure subroutine shut(boundaries, axis, low, high)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: axis
+    !> [m]
+    real(dp), intent(inout) :: low, high
+    integer :: b
+
+    do b = 1, size(boundaries)
+      if (boundaries(b)%present .and. allocated(boundaries(b)%surface)) call boundaries(b)%surface%shut(axis, low, high)
+    end do
+  end subroutine shut
+
+  !> The share of a box that is inside the boundaries that enclose grains: inside that of them which leaves least of it.
+  pure real(dp) function share_inside(boundaries, low, high) result(share)
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> corners (nd) [m]
+    real(dp), intent(in) :: low(:), high(:)
+    real(dp) :: from(3), to(3)
+    integer :: b
+
+    from(:) = 0.0_dp
+    to(:) = 1.0_dp
+    from(1:size(low)) = low
+    to(1:size(high)) = high
+    share = 1.0_dp
+    do b = 1, size(boundaries)
+      if (.not. (boundaries(b)%present .and. allocated(boundaries(b)%surface))) cycle
+      share = min(share, boundaries(b)%surface%share_inside(from, to))
+    end do
+  end function share_inside
 
   !> How far body `k` reaches from its centre, against each axis and then along each [m].
   pure subroutine find_reach(shapes, bodies, k, reach)

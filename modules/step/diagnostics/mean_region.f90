@@ -48,8 +48,8 @@ module gravier_mean_region
     integer :: axis = 1, n = 1
     !> corners of the space that the region takes (nd), and the places of the sides of bins along their axis (0:n) [m]
     real(dp), allocatable :: lower(:), upper(:), side(:)
-    !> volume of a bin [m^3, m^2 in 2D]
-    real(dp) :: volume = 0.0_dp
+    !> volume of each bin (n) [m^3, m^2 in 2D]
+    real(dp), allocatable :: volume(:)
     !> whether bodies end at the sides of each axis: not where there is no side, and not where the region spans a period (nd)
     logical, private, allocatable :: cuts_low(:), cuts_high(:)
     !> after which the region repeats itself along each axis, 0 where it does not (nd) [m]
@@ -95,6 +95,7 @@ contains
     !> cut into its bins, not as a whole
     logical, intent(in) :: binned
     type(region_grid_t), intent(out) :: grid
+    real(dp) :: volume
     integer :: nd, d, k
 
     nd = size(low)
@@ -107,7 +108,7 @@ contains
     grid%upper = high
     grid%period = period
     allocate (grid%cuts_low(nd), grid%cuts_high(nd))
-    grid%volume = 1.0_dp
+    volume = 1.0_dp
     do d = 1, nd
       if (self%lower(d) > -unbounded) grid%lower(d) = self%lower(d)
       if (self%upper(d) < unbounded) grid%upper(d) = self%upper(d)
@@ -119,12 +120,12 @@ contains
         grid%upper(d) = grid%lower(d) + period(d)
         grid%cuts_low(d) = d == grid%axis .and. grid%n > 1
         grid%cuts_high(d) = grid%cuts_low(d)
-        grid%volume = grid%volume*period(d)
+        volume = volume*period(d)
       else
-        grid%volume = grid%volume*(grid%upper(d) - grid%lower(d))
+        volume = volume*(grid%upper(d) - grid%lower(d))
       end if
     end do
-    grid%volume = grid%volume/grid%n
+    allocate (grid%volume(grid%n), source=volume/grid%n)
     allocate (grid%side(0:grid%n))
     associate (from => grid%lower(grid%axis), to => grid%upper(grid%axis))
       do k = 0, grid%n

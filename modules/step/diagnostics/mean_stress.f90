@@ -5,7 +5,7 @@ module gravier_mean_stress
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   use gravier_contact_branch, only: find_branch
-  use gravier_scene_extent, only: find_extent
+  use gravier_scene_extent, only: find_extent, share_inside
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
@@ -88,7 +88,7 @@ contains
     call decomposition%comm%sum_parts(parts, filled)
     call sum_moments(problem, moments)
     call find_extent(decomposition, low, high, length)
-    self%volume = product(length)
+    self%volume = product(length)*share_inside(decomposition%boundaries, low, high)
     do k = 1, nd
       self%stress(:, k) = moments((k - 1)*nd + 1:k*nd)
     end do

@@ -9,7 +9,7 @@ module gravier_region_means
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   use gravier_contact_branch, only: find_branch
-  use gravier_scene_extent, only: find_extent
+  use gravier_scene_extent, only: find_extent, share_inside
   use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t, region_words
   use gravier_region_samples, only: region_samples_t, region_figures_t, sum_rows, centres, volume, mass, energy, ends, holders, &
     & momentum
@@ -236,12 +236,21 @@ contains
     type(decomposition_t), intent(in) :: decomposition
     logical, intent(in) :: binned
     type(region_grid_t), intent(out) :: grids(:)
-    real(dp), dimension(decomposition%nd) :: low, high, length
-    integer :: r
+    real(dp), dimension(decomposition%nd) :: low, high, length, from, to
+    integer :: r, k
 
     call find_extent(decomposition, low, high, length)
     do r = 1, size(regions)
-      call regions(r)%make_grid(low, high, decomposition%period%length(1:decomposition%nd), binned, grids(r))
+      associate (grid => grids(r))
+        call regions(r)%make_grid(low, high, decomposition%period%length(1:decomposition%nd), binned, grid)
+        from(:) = grid%lower
+        to(:) = grid%upper
+        do k = 1, grid%n
+          from(grid%axis) = grid%side(k - 1)
+          to(grid%axis) = grid%side(k)
+          grid%volume(k) = grid%volume(k)*share_inside(decomposition%boundaries, from, to)
+        end do
+      end associate
     end do
   end subroutine make_grids
 

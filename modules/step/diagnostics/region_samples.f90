@@ -90,7 +90,7 @@ contains
       self%sums(energy + 1:, k) = self%sums(energy + 1:, k) + sums(energy + 1:, k)
       if (sums(mass, k) > 0.0_dp) self%sums(energy, k) = self%sums(energy, k) + &
         & max(sums(energy, k) - sum(sums(momentum + 1:momentum + nd, k)**2)/sums(mass, k), 0.0_dp)
-      self%volume(k) = self%volume(k) + grid%volume
+      self%volume(k) = self%volume(k) + grid%volume(k)
       corner(:) = grid%lower
       corner(grid%axis) = grid%side(k - 1)
       self%lower(:, k) = self%lower(:, k) + corner

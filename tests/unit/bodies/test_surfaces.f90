@@ -17,6 +17,7 @@ program test_surfaces
   call test_planes()
   call test_flat_pieces()
   call test_drums()
+  call test_inside()
   call test_ways()
   call test_directions()
   call finish_checks()
@@ -171,6 +172,62 @@ contains
     call expect(cylinder, reshape([zero, zero, [1.5_dp, 0.0_dp, 0.0_dp]], [3, 3]), "axis", "", "no axis")
     call expect(cylinder, reshape([zero, [0.0_dp, 0.0_dp, 2.0_dp], zero], [3, 3]), "radius", "", "no radius")
   end subroutine test_drums
+
+  !> Shares of boxes inside a drum, against areas that are known: a square about a circle, quadrants, a strip, a corner, what is
+  !> outside; of an oblique cylinder about as of one that is nearly so.
+  subroutine test_inside()
+    type(circle_t) :: circle
+    type(cylinder_t) :: cylinder
+    type(plane_t) :: plane
+    real(dp), parameter :: pi = acos(-1.0_dp)
+    real(dp) :: low, high, strip
+
+    circle%point = [1.0_dp, 2.0_dp, 0.0_dp]
+    circle%radius = 0.5_dp
+    call check_close(circle%share_inside([0.5_dp, 1.5_dp, 0.0_dp], [1.5_dp, 2.5_dp, 1.0_dp]), pi/4.0_dp, rounding, "its square")
+    call check_close(circle%share_inside([1.0_dp, 2.0_dp, 0.0_dp], [1.5_dp, 2.5_dp, 1.0_dp]), pi/4.0_dp, rounding, "a quadrant")
+    call check_close(circle%share_inside([0.0_dp, 1.0_dp, 0.0_dp], [1.0_dp, 2.0_dp, 1.0_dp]), pi/16.0_dp, rounding, &
+      & "a quadrant in a larger square")
+    call check_close(circle%share_inside([0.9_dp, 1.9_dp, 0.0_dp], [1.1_dp, 2.2_dp, 1.0_dp]), 1.0_dp, rounding, "a box inside")
+    call check_close(circle%share_inside([1.4_dp, 2.4_dp, 0.0_dp], [1.5_dp, 2.5_dp, 1.0_dp]), 0.0_dp, 1.0e-14_dp, "a box outside")
+    call check_close(circle%share_inside([2.0_dp, 2.0_dp, 0.0_dp], [3.0_dp, 2.5_dp, 1.0_dp]), 0.0_dp, 0.0_dp, "a box far outside")
+    ! the part of a disk above half of its radius
+    strip = 0.25_dp*(pi/3.0_dp - sqrt(0.1875_dp))
+    call check_close(circle%share_inside([0.5_dp, 2.25_dp, 0.0_dp], [1.5_dp, 2.5_dp, 1.0_dp]), strip/0.25_dp, rounding, "a segment")
+    call check_close(circle%share_inside([1.25_dp, 1.5_dp, 0.0_dp], [1.5_dp, 2.5_dp, 1.0_dp]), strip/0.25_dp, rounding, &
+      & "a segment to the right")
+    call check_close(circle%share_inside([1.0_dp, 1.0_dp, 0.0_dp], [1.0_dp, 3.0_dp, 1.0_dp]), 1.0_dp, 0.0_dp, &
+      & "a box without an area")
+    call check_close(plane%share_inside([-1.0_dp, -1.0_dp, 0.0_dp], [1.0_dp, 1.0_dp, 1.0_dp]), 1.0_dp, 0.0_dp, &
+      & "a plane encloses nothing")
+    low = -huge(1.0_dp)
+    high = 1.2_dp
+    call circle%shut(1, low, high)
+    call check_close(low, 0.5_dp, 0.0_dp, "its left end")
+    call check_close(high, 1.2_dp, 0.0_dp, "a plane within it")
+    cylinder%radius = 1.0_dp
+    cylinder%axis = [0.0_dp, 1.0_dp, 0.0_dp]
+    call check_close(cylinder%share_inside([-1.0_dp, 3.0_dp, -1.0_dp], [1.0_dp, 9.0_dp, 1.0_dp]), pi/4.0_dp, rounding, "along y")
+    call check_close(cylinder%share_inside([-1.0_dp, 3.0_dp, 0.0_dp], [0.0_dp, 9.0_dp, 2.0_dp]), pi/8.0_dp, rounding, &
+      & "a part of it")
+    low = -7.0_dp
+    high = 7.0_dp
+    call cylinder%shut(2, low, high)
+    call check_close(low, -7.0_dp, 0.0_dp, "endless along its axis")
+    call cylinder%shut(3, low, high)
+    call check_close(high - low, 2.0_dp, 0.0_dp, "shut across it")
+    call set_direction([1.0e-4_dp, 1.0_dp, 1.0e-4_dp], cylinder%axis)
+    call check_close(cylinder%share_inside([-1.0_dp, -3.0_dp, -1.0_dp], [1.0_dp, 3.0_dp, 1.0_dp]), pi/4.0_dp, 1.0e-3_dp, &
+      & "nearly along y")
+    ! along the diagonal of x and y between two planes across y, which cut it on average where its axis goes through them
+    call set_direction([1.0_dp, 1.0_dp, 0.0_dp], cylinder%axis)
+    cylinder%radius = 0.5_dp
+    call check_close(cylinder%share_inside([-9.0_dp, -1.0_dp, -1.0_dp], [9.0_dp, 1.0_dp, 1.0_dp]), &
+      & 0.25_dp*pi*2.0_dp*sqrt(2.0_dp)/72.0_dp, 1.0e-4_dp, "oblique, between two planes")
+    low = -7.0_dp
+    call cylinder%shut(1, low, high)
+    call check_close(low, -7.0_dp, 0.0_dp, "an oblique one shuts no box")
+  end subroutine test_inside
 
   !> How far points of a surface have moved at most.
   subroutine test_ways()

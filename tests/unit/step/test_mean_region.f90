@@ -76,21 +76,21 @@ contains
     type(region_grid_t) :: grid
 
     grid = grid_of(region, 3, 0.0_dp)
-    call check_close(grid%volume, 1.0_dp, 0.0_dp, "all of the scene")
+    call check_close(grid%volume(1), 1.0_dp, 0.0_dp, "all of the scene")
     call check_equal(grid%n, 1, "in one")
     region%lower(2) = 0.25_dp
     region%upper(1) = 2.0_dp
     region%axis = 2
     region%bins = 3
     grid = grid_of(region, 2, 0.0_dp)
-    call check_close(grid%volume, 0.5_dp, rounding, "volume of a bin")
+    call check_close(grid%volume(1), 0.5_dp, rounding, "volume of a bin")
     call check_close(grid%side(0), 0.25_dp, 0.0_dp, "first side")
     call check_close(grid%side(1), 0.5_dp, rounding, "second side")
     call check_close(grid%side(3), 1.0_dp, 0.0_dp, "last side")
     call check_close(grid%upper(1), 2.0_dp, 0.0_dp, "a side beyond the scene")
     region%lower(2) = 3.0_dp
     grid = grid_of(region, 2, 0.0_dp)
-    call check_close(grid%volume, 0.0_dp, 0.0_dp, "no volume beyond the scene")
+    call check_close(grid%volume(1), 0.0_dp, 0.0_dp, "no volume beyond the scene")
     call check_close(ball_share(grid, [0.5_dp, 0.5_dp], 0.1_dp), 0.0_dp, 0.0_dp, "nothing in it")
   end subroutine test_space
 
@@ -152,7 +152,7 @@ contains
 
     region%upper(1) = 0.5_dp
     grid = grid_of(region, 2, 1.0_dp)
-    call check_close(grid%volume, 0.5_dp, 0.0_dp, "half of the cell")
+    call check_close(grid%volume(1), 0.5_dp, 0.0_dp, "half of the cell")
     call check_close(ball_share(grid, [0.95_dp, 0.4_dp], 0.1_dp), 1.0_dp - disk, rounding, "from across the period")
     call check_close(ball_share(grid, [0.0_dp, 0.4_dp], 0.1_dp), 0.5_dp, rounding, "at its origin")
     call check_close(segment_share(grid, [0.45_dp, 0.4_dp], [0.6_dp, 0.4_dp]), 1.0_dp/3.0_dp, rounding, "a branch leaves")
