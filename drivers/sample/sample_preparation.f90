@@ -230,7 +230,7 @@ contains
     character(len=:), allocatable :: sizes, diameters
     integer :: d
 
-    call find_extent(simulation%decomposition, low, high, length)
+    call find_extent(simulation%decomposition, .false., low, high, length)
     sizes = ""
     diameters = ""
     do d = 1, size(length)

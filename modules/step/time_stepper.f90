@@ -22,7 +22,7 @@ module gravier_time_stepper
   use gravier_physics, only: physics_t
   use gravier_load_areas, only: find_load_areas
   use gravier_problem_builder, only: build_problem
-  use gravier_pair_laws, only: conclude_pairs
+  use gravier_pair_laws, only: conclude_pairs, bonds_at_limit
   use gravier_contact_springs, only: conclude_springs, measure_springs
   use gravier_velocity_scale, only: velocity_scale_t
   use gravier_drift, only: drift_t
@@ -58,8 +58,7 @@ module gravier_time_stepper
   !> overlap allowed are projected again where it is exceeded by rounding
   real(dp), parameter :: rounded_shift = 1.0e-6_dp
 
-  !> times that a step is solved anew with more bodies awake before all wake
-  integer, parameter :: most_tries = 4
+  integer, parameter :: most_tries = 4 ! times that a step is solved anew with more bodies awake before all wake
 
   type :: time_stepper_t
     type(communicator_t), pointer :: comm => null()
@@ -67,8 +66,7 @@ module gravier_time_stepper
     type(decomposition_t) :: decomposition
     type(halo_t) :: halo
     type(physics_t) :: physics
-    !> what the scene has
-    type(effects_t) :: effects
+    type(effects_t) :: effects ! that the scene has
     type(time_table_t) :: gravity_table
     !> what moves the periodic cell
     type(cell_drive_t) :: cell_drive
@@ -83,12 +81,10 @@ module gravier_time_stepper
     real(dp) :: overlap_left = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
     type(repartition_rule_t) :: division
-    !> grains that enter
-    type(inflow_t) :: inflow
+    type(inflow_t) :: inflow ! grains that enter
     class(method_t), allocatable :: method
     type(fallback_t) :: fallback
-    !> solves aim at less error than the goal while the scene drifts
-    type(refinement_t) :: refinement
+    type(refinement_t) :: refinement ! of solves that aim at less error than the goal
     type(solve_control_t) :: control
     !> whether solves may try a pass over layers
     type(backoff_t) :: pass_backoff
@@ -113,8 +109,7 @@ module gravier_time_stepper
     real(dp) :: mass = 0.0_dp, left_mass = 0.0_dp
     !> velocities of grains were set since the last step
     logical :: velocities_set = .false.
-    !> how many grains there were, at least and at most
-    type(population_t) :: population
+    type(population_t) :: population ! how many grains there were, at least and at most
     !> largest over mean number of contacts of a subdomain in the last step
     real(dp) :: imbalance = 1.0_dp
     !> the same just after space was last divided in a step; 0 before
@@ -124,8 +119,7 @@ module gravier_time_stepper
     !> figures that the user asked for, and the steps whose states are written, which some of them wait for
     type(diagnostics_t) :: diagnostics
     type(schedule_t) :: written_steps
-    !> the step whose problem is written, 0: none
-    integer :: dumped_step = 0
+    integer :: dumped_step = 0 ! the step whose problem is written, 0: none
     !> energies of the grains since this run began or went on from a checkpoint
     type(grain_balance_t) :: balance
     !> messages between ranks, and numbers in them, that iterations of this rank have sent
@@ -198,7 +192,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_control_t) :: control
-    real(dp) :: seconds, share
+    real(dp) :: seconds
     integer :: tries, iterations
     logical :: woken
 
@@ -208,13 +202,16 @@ contains
     control%figure_ratio = self%figure_ratio
     ! a pass over layers would replace the impulses that were given
     control%layered = control%layered .and. figures%started%matched == 0 .and. self%pass_backoff%allows(self%step)
-    share = self%drift%goal_share(self%velocity_scale)
     do tries = 1, most_tries + 1
-      call self%refinement%decide(self%problem, control, share)
+      call self%refinement%decide(self%problem, control, self%drift%goal_share(self%velocity_scale))
       if (self%refinement%aims) then
         call self%refinement%solve(self%problem, self%method, control, figures%solve, error, watch)
       else
         call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
+      end if
+      if (self%physics%laws%breaks .and. .not. allocated(error)) then
+        if (bonds_at_limit(self%problem, self%decomposition%boundaries, self%physics%laws, self%halo)) &
+          & call self%refinement%settle(self%problem, self%method, control, figures%solve, error, watch)
       end if
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
       self%messages = self%messages + self%problem%shared%messages
@@ -356,6 +353,7 @@ contains
     type(step_figures_t), intent(in) :: figures
     !> the problem of all contacts, where it is shown and differs from the one that was solved; empty otherwise
     type(contact_problem_t), intent(inout) :: whole
+    logical :: doubtful
 
     if (self%problem%cell%moves) then
       call take_cell(self%problem, self%decomposition%period)
@@ -367,7 +365,9 @@ contains
       & self%step + 1 == self%dumped_step)) call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
     if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
-      & figures%uncertain_velocity(self%velocity_scale%bonds), self%halo)
+      & self%refinement%doubt(figures%uncertain_velocity(self%velocity_scale%bonds), &
+      & self%control%accuracy*self%velocity_scale%value), self%halo, doubtful)
+    if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, figures%solve%iterations)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)

@@ -12,6 +12,8 @@ module gravier_accuracy_lines
     & creep_lines, goal_name, goal_text, mean_size_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
+  !> steps in which bonds may be in doubt until solves aim at less error
+  integer, parameter :: few_in_doubt = 20
 
 contains
 
@@ -157,13 +159,20 @@ contains
     associate (drift => simulation%drift, refinement => simulation%refinement)
       if (refinement%refined > 0) then
         text = "refined     "//counted(refinement%refined, "solve")//" aimed at less error than the goal, down to the "// &
-          & goal_text(simulation, refinement%least_share)//", so that errors do not add up where nothing else moves; "
+          & goal_text(simulation, refinement%least_share)//", so that "
+        if (refinement%for_bonds < refinement%refined) text = text//"errors do not add up where nothing else moves"
+        if (refinement%for_bonds > 0 .and. refinement%for_bonds < refinement%refined) text = text//" and "
+        if (refinement%for_bonds > 0) text = text//"bonds break where they should, in "//counted(refinement%for_bonds, "solve")
+        text = text//"; "
         if (refinement%reached == refinement%refined) then
           text = text//"all came to it"//newline
         else
           text = text//to_text(refinement%reached)//" came to it, the others gave it up after "// &
             & counted(refinement%in_vain, "iteration")//" in all"//newline
         end if
+        if (refinement%in_doubt > few_in_doubt) text = text//indent//"in "//to_text(refinement%in_doubt)// &
+          & " steps solves did not tell whether bonds at their limits break: a larger &solver max_iterations helps, of which "// &
+          & "they take a quarter"//newline
       end if
       if (.not. drifts(simulation)) return
       way = drift%length()/simulation%velocity_scale%diameter

@@ -376,8 +376,11 @@ class Diagnostics(RunTestCase):
         np.testing.assert_allclose(history["volume"], np.pi * wide**2 * 2 * RADIUS, rtol=1e-13)
         np.testing.assert_allclose(history["half_stress_zz"], force / (np.pi * wide**2), rtol=1e-9)
         np.testing.assert_allclose(history["half_volume"], np.pi * wide**2 * RADIUS, rtol=1e-13)
+        # a sphere that fills the tube: the force works on its cross-section
+        boundaries[2]["radius"] = 1.0000001 * RADIUS
+        run = self.run_here("narrow", merged(case, ALL), boundaries)
         pressure = re.search(r"pressure P = (\S+) Pa", gravier("--check", "case.nml", directory=run.directory).stdout)
-        self.assertAlmostEqual(float(pressure[1]) * np.pi * wide**2 / force, 1.0, delta=5e-3)
+        self.assertAlmostEqual(float(pressure[1]) * np.pi * RADIUS**2 / force, 1.0, delta=5e-3)
 
     def test_sticking_and_flying(self):
         """A disk at rest on a slope of less than the angle of friction does not slide when it must not turn; another flies."""

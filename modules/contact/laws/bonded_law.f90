@@ -77,16 +77,18 @@ contains
     pair%terms%joins = .true.
   end subroutine bonded_evaluate
 
-  !> A bond at its limit breaks if its bodies part or slide faster than the solve may be wrong.
+  !> A bond at its limit breaks if its bodies part or slide faster than the solve may be wrong. One that moves less is in doubt.
   pure subroutine bonded_conclude(self, pair)
     class(bonded_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
     logical :: at_limit
 
+    pair%doubtful = .false.
     if (pair%state /= intact) return
     ! this holds of a bond under its full tension, too: both impulses are 0
     at_limit = pair%tangential >= (1.0_dp - unused)*self%bond_friction*pair%normal
-    if (at_limit .and. pair%motion > pair%uncertain) pair%state = 0
+    pair%doubtful = at_limit .and. .not. pair%motion > pair%uncertain
+    if (at_limit .and. .not. pair%doubtful) pair%state = 0
   end subroutine bonded_conclude
 
 end module gravier_bonded_law

@@ -57,6 +57,8 @@ module gravier_contact_law
     !> once the step is solved, of a law that breaks: how fast the bodies part or slide on each other, beside what their joint
     !> allows, and the velocity up to which the solve may be wrong about that [m/s]
     real(dp) :: motion = 0.0_dp, uncertain = 0.0_dp
+    !> made by `conclude`: it is at its limit, and the solve is not exact enough to tell whether it breaks
+    logical :: doubtful = .false.
   end type contact_pair_t
 
   type, abstract :: contact_law_t

@@ -1,5 +1,6 @@
 !> Solves that aim at less error than they have to, as long as that costs little. Errors within the goal may add up from step to
-!> step where nothing moves (gravier_drift). What a solve leaves of the smaller goal, the next one starts from: that is no failure.
+!> step where nothing moves (gravier_drift), and they may hide whether a bond at its limit opens. What a solve leaves of the smaller
+!> goal, the next one starts from: that is no failure.
 module gravier_refinement
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -24,14 +25,25 @@ module gravier_refinement
   !> share of the goal above which a smaller one is not worth aiming at, and tolerance of the residual that none falls below
   real(dp), parameter :: worth_it = 0.5_dp, least_tolerance = 1.0e-12_dp
 
+  !> share of the goal while bonds are in doubt, steps for which that lasts once they are not, and times that goal by which a bond may
+  !> move in a solve that comes to it, because the goal is a mean
+  real(dp), parameter :: share_for_bonds = 0.01_dp, of_single_bond = 10.0_dp
+  integer, parameter :: steps_for_bonds = 20
+  !> steps, the last ones, that a bond waits for a solve that tells, until one to the goal of the user decides
+  integer, parameter :: most_waited = 20
+  !> iterations that it may take at least, and times those of the solve to the goal of the user
+  integer, parameter :: iterations_for_bonds = 1000, times_for_bonds = 4
+
   !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
-  integer, parameter :: refinement_words = 2 + backoff_words
-  character(len=*), parameter :: refinement_record = "turns doublings "//backoff_record
+  integer, parameter :: refinement_words = 5 + backoff_words
+  character(len=*), parameter :: refinement_record = "turns doublings caution usual waited "//backoff_record
 
   type :: refinement_t
     !> since this run began or went on from a checkpoint: solves that aimed at less error, those of them that came to it, and
     !> iterations of the others until they gave it up
     integer(i8) :: refined = 0, reached = 0, in_vain = 0
+    !> solves that aimed at less error because bonds were in doubt; steps whose solves left them there, as they did not come to it
+    integer(i8) :: for_bonds = 0, in_doubt = 0
     !> the smallest error aimed at, over that of the user
     real(dp) :: least_share = 1.0_dp
     !> whether the next solve aims at less error, by the last `decide`
@@ -42,8 +54,16 @@ module gravier_refinement
     integer, private :: turns = 0
     !> how often the iterations that they may take were doubled
     integer, private :: doublings = 0
+    !> the last solve might have come to a share of its goal; it did
+    logical, private :: may_be_fine = .false., is_fine = .false.
+    !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone; steps,
+    !> the last ones, in which bonds were in doubt and solves came to no less error
+    integer, private :: caution = 0, usual = 0, waited = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
+    procedure :: doubt => refinement_doubt
+    procedure :: settle => refinement_settle
+    procedure :: note_bonds => refinement_note_bonds
     procedure :: decide => refinement_decide
     procedure :: solve => refinement_solve
     procedure :: get_state => refinement_get_state
@@ -52,16 +72,83 @@ module gravier_refinement
 
 contains
 
+  !> The velocity up to which the last solve may be wrong about the bodies of a bond at its limit; huge where the next one is waited
+  !> for [m/s].
+  pure real(dp) function refinement_doubt(self, uncertain, goal) result(doubt)
+    class(refinement_t), intent(in) :: self
+    !> by the estimate of the solve; the error that the user allows [m/s]
+    real(dp), intent(in) :: uncertain, goal
+
+    doubt = uncertain
+    if (self%is_fine) then
+      doubt = max(uncertain, of_single_bond*share_for_bonds*goal)
+    else if (self%may_be_fine .and. self%waited < most_waited) then
+      doubt = huge(1.0_dp)
+    end if
+  end function refinement_doubt
+
+  !> Go on with a solve that has reached its goal and leaves bonds at their limits, so that it tells which of them break. The report is
+  !> that of both as of one. Collective.
+  subroutine refinement_settle(self, problem, method, control, report, error, watch)
+    class(refinement_t), intent(inout) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(inout) :: method
+    !> with the goal of the user
+    type(solve_control_t), intent(in) :: control
+    type(solve_report_t), intent(inout) :: report
+    type(error_t), allocatable, intent(inout) :: error
+    class(solve_watch_t), intent(inout), optional :: watch
+    type(solve_report_t) :: further
+
+    if (self%aims .or. report%status /= solve_converged .or. control%criterion /= by_velocity) return
+    self%turns = self%turns + 1
+    if (.not. self%backoff%allows(self%turns)) return
+    self%caution = steps_for_bonds
+    self%usual = report%iterations
+    self%share = share_for_bonds
+    call attempt(self, problem, method, control, further, error, watch)
+    if (allocated(error)) return
+    if (further%status == solve_converged) then
+      further%goal = control%accuracy
+      further%violation_allowed = further%violation_allowed/self%share
+      call further%follow(report)
+      report = further
+    else
+      report%iterations = report%iterations + further%iterations
+      report%seconds = report%seconds + further%seconds
+    end if
+    ! both are one solve
+    method%work%solves = method%work%solves - 1
+  end subroutine refinement_settle
+
+  !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks.
+  pure subroutine refinement_note_bonds(self, doubtful, iterations)
+    class(refinement_t), intent(inout) :: self
+    logical, intent(in) :: doubtful
+    !> of the solve
+    integer, intent(in) :: iterations
+
+    if (.not. self%aims .and. self%caution < steps_for_bonds) self%usual = iterations
+    self%waited = merge(self%waited + 1, 0, doubtful .and. .not. self%is_fine)
+    if (self%waited > 0) self%in_doubt = self%in_doubt + 1
+    self%caution = max(0, self%caution - 1)
+    if (doubtful) self%caution = steps_for_bonds
+  end subroutine refinement_note_bonds
+
   !> Whether the next solve aims at a share of its goal: not where that is hardly smaller, or where too many solves before did not
   !> come to it.
   pure subroutine refinement_decide(self, problem, control, share)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     type(solve_control_t), intent(in) :: control
+    !> that is asked for where no bond is in doubt
     real(dp), intent(in) :: share
 
+    self%may_be_fine = control%criterion == by_velocity
+    self%is_fine = .false.
     self%share = share
-    self%aims = .not. (share > worth_it .or. control%criterion /= by_velocity .or. problem%n_contacts == 0)
+    if (self%caution > 0) self%share = min(share, share_for_bonds)
+    self%aims = .not. (self%share > worth_it .or. control%criterion /= by_velocity .or. problem%n_contacts == 0)
     if (.not. self%aims) return
     self%turns = self%turns + 1
     self%aims = self%backoff%allows(self%turns)
@@ -114,14 +201,18 @@ contains
     further = control
     further%accuracy = self%share*control%accuracy
     further%tolerance = max(self%share*control%tolerance, min(control%tolerance, least_tolerance))
-    further%max_iterations = min(control%max_iterations/part_of_all, few_iterations*2**self%doublings)
+    further%max_iterations = few_iterations*2**self%doublings
+    if (self%caution > 0) further%max_iterations = max(further%max_iterations, iterations_for_bonds, times_for_bonds*self%usual)
+    further%max_iterations = min(further%max_iterations, control%max_iterations/part_of_all)
     call copy_impulses(problem, kept)
     call solve_contacts(problem, method, further, report, error, watch=watch)
     if (allocated(error)) return
     self%refined = self%refined + 1
+    if (self%caution > 0) self%for_bonds = self%for_bonds + 1
     self%least_share = min(self%least_share, self%share)
     if (report%status == solve_converged) then
       self%reached = self%reached + 1
+      self%is_fine = .true.
       if (self%doublings > 0 .and. 4*report%iterations < further%max_iterations) self%doublings = self%doublings - 1
       call self%backoff%note(self%turns, tried=.true., kept=.true.)
     else
@@ -141,7 +232,10 @@ contains
 
     words(1) = self%turns
     words(2) = self%doublings
-    call self%backoff%get_state(words(3:))
+    words(3) = self%caution
+    words(4) = self%usual
+    words(5) = self%waited
+    call self%backoff%get_state(words(6:))
   end subroutine refinement_get_state
 
   pure subroutine refinement_set_state(self, words)
@@ -150,7 +244,10 @@ contains
 
     self%turns = narrow(words(1))
     self%doublings = narrow(words(2))
-    call self%backoff%set_state(words(3:))
+    self%caution = narrow(words(3))
+    self%usual = narrow(words(4))
+    self%waited = narrow(words(5))
+    call self%backoff%set_state(words(6:))
   end subroutine refinement_set_state
 
 end module gravier_refinement

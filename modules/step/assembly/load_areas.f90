@@ -71,7 +71,7 @@ contains
   end function area_across
 
   !> Areas that the loads on boundaries work on. Where a scene is open across a load, or shut in by other boundaries than planes,
-  !> its grains tell how far it goes: at least as far as the load works. Of a circle or a cylinder it fills what these leave of it.
+  !> its grains tell how far it goes: at least as far as the load works. Circles and cylinders leave a part of that.
   !> Collective.
   subroutine find_load_areas(decomposition, area)
     type(decomposition_t), intent(in) :: decomposition
@@ -88,7 +88,7 @@ contains
       if (.not. decomposition%boundaries(b)%is_driven()) cycle
       area(b) = load_area(decomposition, b, extent)
       if (area(b) > 0.0_dp .or. known) cycle
-      call find_extent(decomposition, low, high, extent)
+      call find_extent(decomposition, .false., low, high, extent)
       known = .true.
       area(b) = load_area(decomposition, b, extent)*share_inside(decomposition%boundaries, low, high)
     end do

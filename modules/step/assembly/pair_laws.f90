@@ -13,7 +13,8 @@ module gravier_pair_laws
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity, add_image_velocity
   implicit none
   private
-  public :: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair, conclude_pairs
+  public :: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair, conclude_pairs, &
+    & bonds_at_limit
 
 contains
 
@@ -136,17 +137,20 @@ contains
   end subroutine find_reduced
 
   !> The states of the pairs of a solved problem, whose impulses and velocities are those of the solve.
-  subroutine conclude_pairs(problem, boundaries, laws, uncertain, halo)
+  subroutine conclude_pairs(problem, boundaries, laws, uncertain, halo, doubtful)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     !> velocity up to which the solve may be wrong about what a contact does [m/s]
     real(dp), intent(in) :: uncertain
     type(halo_t), intent(inout) :: halo
+    !> some bond is at its limit, and the solve is not exact enough to tell whether it breaks
+    logical, intent(out) :: doubtful
     real(dp), allocatable :: v(:, :, :)
     type(contact_pair_t) :: pair
     integer :: s, c, q, g, l, p
 
+    doubtful = .false.
     pair%uncertain = uncertain
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
@@ -163,10 +167,43 @@ contains
           if (laws%breaks) pair%motion = hypot(max(v(q, 1, g), 0.0_dp), norm2(v(q, 2:nf, g)))
           call laws%of(l)%law%conclude(pair)
           view%list%state(view%list%memory%law_row, p) = pair%state
+          doubtful = doubtful .or. pair%doubtful
         end do
       end associate
     end do
+    if (laws%breaks) doubtful = problem%comm%any_true(doubtful)
   end subroutine conclude_pairs
+
+  !> Whether an intact bond is at its limit in a solved problem. Collective.
+  logical function bonds_at_limit(problem, boundaries, laws, halo) result(are_at_limit)
+    type(contact_problem_t), intent(in) :: problem
+    type(boundary_t), intent(in) :: boundaries(:)
+    type(law_set_t), intent(in) :: laws
+    type(halo_t), intent(in) :: halo
+    type(contact_pair_t) :: pair
+    integer :: s, c, q, g, l, p
+
+    are_at_limit = .false.
+    ! whatever moves is in doubt
+    pair%uncertain = huge(1.0_dp)
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+        do c = 1, sub%n_contacts
+          p = sub%source(c)
+          l = law_of(view, boundaries, laws, p)
+          if (.not. laws%of(l)%law%breaks) cycle
+          q = lane_of(c)
+          g = block_of(c)
+          pair%state = view%list%state(view%list%memory%law_row, p)
+          pair%normal = sub%impulse(q, 1, g)
+          pair%tangential = norm2(sub%impulse(q, 2:nf, g))
+          call laws%of(l)%law%conclude(pair)
+          are_at_limit = are_at_limit .or. pair%doubtful
+        end do
+      end associate
+    end do
+    are_at_limit = problem%comm%any_true(are_at_limit)
+  end function bonds_at_limit
 
   !> Velocities of the contacts of a solved subdomain beside those that their laws ask for where the bodies stay joined.
   subroutine find_slips(problem, s, v)

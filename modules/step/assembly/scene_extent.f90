@@ -14,11 +14,13 @@ module gravier_scene_extent
 contains
 
   !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that shut
-  !> it in. In the place of planes that are not there it ends where a circle or a cylinder along an axis ends that encloses it, and
-  !> otherwise at the outermost points of the grains. Planes that have turned count where they are at the middle of the other axes.
-  !> No length where nothing bounds it. Collective.
-  subroutine find_extent(decomposition, low, high, length)
+  !> it in. In the place of planes that are not there it ends at the outermost points of the grains, or, if that is asked for, where a
+  !> circle or a cylinder along an axis ends that encloses it. Planes that have turned count where they are at the middle of the other
+  !> axes. No length where nothing bounds it. Collective.
+  subroutine find_extent(decomposition, enclosed, low, high, length)
     type(decomposition_t), intent(in) :: decomposition
+    !> it fills the circles and cylinders that enclose it
+    logical, intent(in) :: enclosed
     !> (nd) [m]
     real(dp), intent(out) :: low(:), high(:), length(:)
     real(dp) :: extremes(2*decomposition%nd), reach(2*decomposition%nd)
@@ -54,7 +56,7 @@ contains
         cycle
       end if
       call find_facing_planes(decomposition%boundaries, d, middle, low(d), high(d))
-      call shut(decomposition%boundaries, d, low(d), high(d))
+      if (enclosed) call shut(decomposition%boundaries, d, low(d), high(d))
       if (.not. low(d) > -huge(1.0_dp)) low(d) = min(-extremes(d), high(d))
       if (.not. high(d) < huge(1.0_dp)) high(d) = max(extremes(nd + d), low(d))
       ! neither planes nor grains

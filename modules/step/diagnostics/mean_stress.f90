@@ -87,7 +87,7 @@ contains
     end do
     call decomposition%comm%sum_parts(parts, filled)
     call sum_moments(problem, moments)
-    call find_extent(decomposition, low, high, length)
+    call find_extent(decomposition, .true., low, high, length)
     self%volume = product(length)*share_inside(decomposition%boundaries, low, high)
     do k = 1, nd
       self%stress(:, k) = moments((k - 1)*nd + 1:k*nd)

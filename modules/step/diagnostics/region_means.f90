@@ -239,7 +239,7 @@ contains
     real(dp), dimension(decomposition%nd) :: low, high, length, from, to
     integer :: r, k
 
-    call find_extent(decomposition, low, high, length)
+    call find_extent(decomposition, .true., low, high, length)
     do r = 1, size(regions)
       associate (grid => grids(r))
         call regions(r)%make_grid(low, high, decomposition%period%length(1:decomposition%nd), binned, grid)

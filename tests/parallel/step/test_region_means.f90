@@ -121,14 +121,14 @@ contains
 
     call make_scene(comm, &
       & "&scene bodies = 'column', column_count = 3, radius = 0.1, mass = 1 / &time step = 0.01, steps = 1 /", sim)
-    call find_extent(sim%decomposition, low, high, length)
+    call find_extent(sim%decomposition, .true., low, high, length)
     call check_close(length(1), 0.2_dp, 1.0e-15_dp, "a grain wide")
     call check_close(length(2), 0.6_dp, 1.0e-15_dp, "three grains high, from the ground")
     call check_close(maxval(abs(length - (high - low))), 0.0_dp, 0.0_dp, "length")
     call make_scene(comm, &
       & "&scene bodies = 'none' / &insertion lower = 0, 0, upper = 1, 1, rate = 1, radius = 0.1 / &time step = 0.01, "// &
       & "steps = 1 / &boundary shape = 'plane', normal = 0, 1, point = 0, -0.5 /", sim)
-    call find_extent(sim%decomposition, low, high, length)
+    call find_extent(sim%decomposition, .true., low, high, length)
     call check_close(low(2), -0.5_dp, 0.0_dp, "a plane alone")
     call check_close(maxval(length), 0.0_dp, 0.0_dp, "a scene without grains takes no space")
   end subroutine test_extent
