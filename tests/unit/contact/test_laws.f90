@@ -308,13 +308,16 @@ contains
     pair%tangential = 1.6_dp*(1.0_dp - 2*unused)
     call law%conclude(pair)
     call check_equal(pair%state, 1, "bonded: a bond below its shear strength stays, whatever the solve leaves of velocities")
+    call check(.not. pair%doubtful, "bonded: it is not in doubt")
     pair%tangential = 1.6_dp
     pair%motion = 0.02_dp
     call law%conclude(pair)
     call check_equal(pair%state, 1, "bonded: a bond at its shear strength that does not slide stays")
+    call check(pair%doubtful, "bonded: it is in doubt")
     pair%motion = 0.03_dp
     call law%conclude(pair)
     call check_equal(pair%state, 0, "bonded: a bond at its shear strength that slides breaks")
+    call check(.not. pair%doubtful, "bonded: there is no doubt about that")
     pair%state = 1
     pair%normal = 0.0_dp
     pair%tangential = 0.0_dp

@@ -26,6 +26,7 @@ program test_refinement
   call test_limits()
   call test_pauses()
   call test_trace()
+  call test_bonds()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -259,5 +260,71 @@ contains
     end do
     call sim%free()
   end subroutine test_trace
+
+  !> A solve that leaves bonds at their limits goes on to a hundredth of its goal, in one solve, and so do those of the next twenty
+  !> steps. Until it has come to that, what bonds do is waited for, twenty steps at most.
+  subroutine test_bonds()
+    type(simulation_t) :: sim
+    type(solve_control_t) :: control
+    type(solve_report_t) :: report
+    type(refinement_t) :: refinement, again
+    class(method_t), allocatable :: method, in_vain
+    type(error_t), allocatable :: error
+    integer(i8) :: words(refinement_words)
+    integer :: k
+
+    call prepare(sim, control)
+    control%accuracy = 1.0e-3_dp
+    control%tolerance = 1.0e-1_dp
+    allocate (nlgs_t :: method)
+    allocate (in_vain, source=scaling_t(factor=1.0_dp))
+    report%status = solve_converged
+    report%iterations = 7
+    in_vain%work%solves = 1
+    method%work%solves = 1
+    call refinement%decide(sim%problem, control, 1.0_dp)
+    call check_close(refinement%doubt(0.3_dp, 2.0_dp), huge(1.0_dp), 0.0_dp, "bonds: a solve to the goal of the user does not tell")
+    call refinement%settle(sim%problem, in_vain, control, report, error)
+    call check_equal(report%iterations, 1007, "bonds: iterations of both, in vain")
+    call check_close(refinement%doubt(0.3_dp, 2.0_dp), huge(1.0_dp), 0.0_dp, "bonds: nor does one that does not come to less error")
+    do k = 1, 20
+      call check_close(refinement%doubt(0.3_dp, 2.0_dp), huge(1.0_dp), 0.0_dp, "bonds: it is waited for")
+      call refinement%note_bonds(.true., 7)
+    end do
+    call check_close(refinement%doubt(0.3_dp, 2.0_dp), 0.3_dp, 0.0_dp, "bonds: until it is not")
+    call check_equal(int(refinement%in_doubt), 20, "bonds: steps in doubt")
+    call refinement%get_state(words)
+    call again%set_state(words)
+    call again%decide(sim%problem, control, 1.0_dp)
+    call check_close(again%doubt(0.3_dp, 2.0_dp), 0.3_dp, 0.0_dp, "bonds: the same after a restart")
+    call check(again%aims, "bonds: solves aim at less error then")
+    refinement = refinement_t()
+    call refinement%decide(sim%problem, control, 1.0_dp)
+    report%iterations = 7
+    call refinement%settle(sim%problem, method, control, report, error)
+    call check_close(on_ground(sim), 2.0_dp, 1.0e-3_dp, "bonds: less error")
+    call check(report%iterations > 7, "bonds: iterations of both")
+    call check_close(report%goal, 1.0e-3_dp, 0.0_dp, "bonds: the goal of the user")
+    call check_equal(int(method%work%solves), 1, "bonds: one solve")
+    call check_equal(int(in_vain%work%solves), 1, "bonds: one solve in vain")
+    call check_equal(int(refinement%for_bonds), 1, "bonds: counted")
+    call check_close(refinement%doubt(0.3_dp, 2.0_dp), 0.3_dp, 0.0_dp, "bonds: by the estimate of the solve")
+    call check_close(refinement%doubt(1.0e-3_dp, 2.0_dp), 0.2_dp, 1.0e-15_dp, "bonds: no less than a tenth of the goal of the user")
+    do k = 1, 20
+      call refinement%note_bonds(.false., 7)
+      call refinement%decide(sim%problem, control, 1.0_dp)
+      call check(refinement%aims .eqv. k < 20, "bonds: for twenty steps")
+    end do
+    call refinement%note_bonds(.true., 7)
+    call refinement%decide(sim%problem, control, 1.0_dp)
+    call check(refinement%aims, "bonds: again in doubt")
+    control%criterion = by_residual
+    call refinement%decide(sim%problem, control, 1.0_dp)
+    report%iterations = 7
+    call refinement%settle(sim%problem, method, control, report, error)
+    call check_equal(report%iterations, 7, "bonds: another criterion goes on with nothing")
+    call check_close(refinement%doubt(0.3_dp, 2.0_dp), 0.3_dp, 0.0_dp, "bonds: and tells as it is")
+    call sim%free()
+  end subroutine test_bonds
 
 end program test_refinement

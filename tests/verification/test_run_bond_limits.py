@@ -1,0 +1,71 @@
+"""Bonds at their limits, at default settings: they break where they should, and not by the errors of solves."""
+import os
+
+import numpy as np
+
+from gravier_runs import RunTestCase, merged, run_case, write
+
+G = 9.81
+CASE = {
+    "scene": {"dimension": 2, "bodies": "file", "bodies_file": "grains.csv"},
+    "material": {"name": "c"},
+    "time": {"step": 1e-3},
+    "output": {"directory": "results", "every": 0, "bonds": True},
+}
+
+
+def bond(strength, friction):
+    return {"materials": "c", "kind": "bonded", "bond_strength": strength, "bond_friction": friction, "bond_distance": 1e-5, "friction": 0.5}
+
+
+class Limits(RunTestCase):
+
+    def play(self, title, grains, files, case):
+        """A run of grains (lines of a table), files by name, and groups: itself and its bonds after each step."""
+        directory = self.here(title)
+        os.mkdir(directory)
+        write(self.here(title, "grains.csv"), grains)
+        for name, text in files.items():
+            write(self.here(title, name), text)
+        run = run_case(merged(CASE, case), directory=directory)
+        self.assert_status(run, 0)
+        return run, run.history()["bonds"]
+
+    def test_sheet_bears_a_load(self):
+        """Twelve rows of eight disks in a triangular lattice, periodic, between two that are glued. All inclined bonds at 0.9 of their strength
+        are in balance with 0.9 of the strength of a row, 2 n F cos 30. The sheet tore after half a second, in solves that had converged."""
+        wide, high, radius, strength = 8, 12, 0.01, 10.0
+        places = [(2 * radius * (i + 0.5 * (j % 2)), radius * 3**0.5 * j) for j in range(high) for i in range(wide)]
+        grains = "id,x,y,radius,mass,group\n" + "".join(f"{k + 1},{x!r},{y!r},{radius},1.0,{1 if k < wide else 2 if k >= wide * (high - 1) else 0}\n"
+                                                         for k, (x, y) in enumerate(places))
+        load = 0.9 * 2 * wide * strength * np.cos(np.pi / 6)
+        run, bonds = self.play("sheet", grains, {"load.csv": f"time,fy\n0,{load!r}\n1,{load!r}\n"}, {
+            "scene": {"gravity": [0.0, 0.0], "period": [2 * radius * wide, 0.0]}, "law": bond(strength, 10.0), "time": {"steps": 1000},
+            "boundary": [{"name": "top", "shape": "grains", "group": 1},
+                         {"name": "pull", "shape": "grains", "group": 2, "free": [False, True], "mass": 8.0, "table": "load.csv"}]})
+        np.testing.assert_array_equal(bonds, bonds[0])
+        self.assertRegex(run.stdout, r"\nrefined     \d+ solves aimed at less error than the goal, down to the accuracy 1.00E-03, so that bonds break "
+                                     r"where they should, in \d+ solves; ")
+
+    def test_tower_breaks(self):
+        """Twenty bonded blocks on one that is glued, under a lateral gravity that grows: its moment on the lowest bond, n m gx n a/2, has to be
+        less than that of the bond and of the weight, a (F + n m g/2). The bond broke at 1.46 of that load."""
+        n, side, strength = 20, 0.1, 1000.0
+        grains = "id,x,y,shape,group\n" + "".join(f"{k + 1},0.0,{side * (k + 0.5)!r},sq,{1 if k == 0 else 0}\n" for k in range(n + 1))
+        limit = 2.0 * (strength + 0.5 * n * G) / n**2
+        _, bonds = self.play("tower", grains, {
+            "load.csv": f"time,gx,gy\n0,0,{-G}\n2.0,{2 * limit!r},{-G}\n", "blocks.shapes": "shape sq\npolygon -0.05 -0.05 0.05 -0.05 0.05 0.05 -0.05 0.05\n"}, {
+            "scene": {"shapes": "blocks.shapes", "gravity_table": "load.csv"}, "material": {"density": 1.0 / side**2}, "law": bond(strength, 5.0),
+            "boundary": {"name": "root", "shape": "grains", "group": 1}, "time": {"steps": 1200}})
+        first = np.flatnonzero(bonds < bonds[0])[0] * 1e-3
+        self.assertGreater(first, 0.97)
+        self.assertLess(first, 1.05)
+
+    def test_chain_breaks_once(self):
+        """Five bonded disks between two ends, one of which is drawn away ever faster: one bond breaks, and no load is left for the others. All six
+        broke in one step."""
+        grains = "id,x,y,radius,mass,group\n" + "".join(f"{k + 1},{0.02 * k!r},0.0,0.01,1.0,{(1, 2)[k // 6] if k in (0, 6) else 0}\n" for k in range(7))
+        _, bonds = self.play("chain", grains, {"drive.csv": "time,vx\n0,0\n1.0,0.0001\n"}, {
+            "scene": {"gravity": [0.0, 0.0]}, "law": {**bond(10.0, 10.0), "friction": 0.0}, "time": {"steps": 200},
+            "boundary": [{"name": "top", "shape": "grains", "group": 1}, {"name": "pull", "shape": "grains", "group": 2, "table": "drive.csv"}]})
+        self.assertEqual((bonds[0], bonds[-1]), (6, 5))
