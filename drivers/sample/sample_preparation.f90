@@ -207,7 +207,8 @@ contains
 
     call log%line("sample      "//to_text(simulation%n_grains)//" grains, solid fraction "// &
       & fixed(solid_fraction(simulation), 4)//", contacts per grain "//fixed(contacts_per_grain(simulation), 3)// &
-      & ", largest overlap "//fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii, "// &
+      & ", largest overlap "//fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii"// &
+      & trim(merge(" of rigid contacts", "                  ", simulation%physics%laws%yields))//", "// &
       & to_text(simulation%step)//" steps", error)
     call write_size(simulation, log, error)
     if (simulation%config%sample%preparation == "compacted") then

@@ -18,6 +18,8 @@ module gravier_scale_report
   real(dp), parameter :: most_by_gravity = 1.0e-2_dp
   !> radii by which a grain may move in a step, lest it passes through others
   real(dp), parameter :: most_by_fall = 1.0_dp
+  !> part of the slip scale of a law that errors may be
+  real(dp), parameter :: most_of_slip = 0.5_dp
   !> radii of the smallest grain by which a boundary may move in a step
   real(dp), parameter :: most_by_boundary = 0.1_dp
   !> h sqrt(k/m) of the stiffest spring of a contact, six steps of a collision
@@ -116,6 +118,10 @@ contains
       if (h*sqrt(2.0_dp*g*scales%fall) > most_by_fall*half) call warn_step("a grain that falls "//figure(scales%fall)// &
         & " m to the lowest support moves by "//figure(h*sqrt(2.0_dp*g*scales%fall)/half)// &
         & halves//" in it and may pass through others", most_by_fall*half/sqrt(2.0_dp*g*scales%fall))
+      if (h*scales%entering_speed > most_by_fall*half) call warn_step("grains that enter are at up to "// &
+        & figure(scales%entering_speed)//" m/s where they have fallen to the lowest support, move by "// &
+        & figure(h*scales%entering_speed/half)//halves//" in it and may pass through others", &
+        & most_by_fall*half/scales%entering_speed)
       if (scales%speed*h > most_by_boundary*scales%smallest .and. scales%smallest > 0.0_dp) call warn_step("boundary '"// &
         & simulation%decomposition%boundaries(scales%fastest)%name//"' moves by "//figure(scales%speed*h/scales%smallest)// &
         & least//" in it", most_by_boundary*scales%smallest/scales%speed)
@@ -134,6 +140,10 @@ contains
             & "at most "//figure(boundary%mass*scales%gain/error)//" kg would do")
         end associate
       end if
+      if (error > most_of_slip*simulation%physics%laws%slip_scale .and. solver%criterion == "velocity_error") call warn( &
+        & "&law slip_scale = "//figure(simulation%physics%laws%slip_scale)//" m/s: solves may leave errors of "//figure(error)// &
+        & " m/s, which take contacts out of their static friction; an accuracy of at most "// &
+        & figure(most_of_slip*solver%accuracy*simulation%physics%laws%slip_scale/error)//" would do, or a smaller &time step")
       ! error over speed of the wall = 2 tolerance a/I = 2 tolerance load/(rate d), measured
       if (scales%shear .and. scales%load > 0.0_dp .and. solver%criterion == "residual") then
         most = error_share*scales%rate*d/(2.0_dp*scales%load)

@@ -24,6 +24,8 @@ module gravier_scene_scales
     real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
     !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
     real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
+    !> largest speed of a grain that enters, where it has fallen to the lowest support [m/s]
+    real(dp) :: entering_speed = 0.0_dp
     !> largest pressure on a boundary that forces move [Pa, N/m in 2D], and which
     real(dp) :: pressure = 0.0_dp
     integer :: pressed = 0
@@ -75,6 +77,7 @@ contains
     call find_times(simulation, times)
     call scan(self, simulation, extent, times)
     call find_fall(self, simulation, extent)
+    call find_entering(self, simulation, extent)
   end subroutine scene_scales_find
 
   !> I = rate d sqrt(rho/P); 0 where one of them is not known.
@@ -349,6 +352,36 @@ contains
     self%fall = min(height*(1.0_dp - extent%volume/(footprint*height*loosest(nd))), height - self%diameter)
     self%fall = max(self%fall, 0.0_dp)
   end subroutine find_fall
+
+  !> The largest speed of a grain that enters: that which it has then, and what it gains as it falls to the lowest support.
+  subroutine find_entering(self, simulation, extent)
+    class(scene_scales_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
+    type(extent_t), intent(in) :: extent
+    type(extent_t) :: region
+    real(dp) :: up, top, support, fall
+    integer :: axis, i, b
+
+    self%entering_speed = 0.0_dp
+    axis = maxloc(abs(self%acceleration), dim=1)
+    up = -sign(1.0_dp, self%acceleration(axis))
+    region = extent
+    do i = 1, size(simulation%inflow%insertions)
+      associate (insertion => simulation%inflow%insertions(i))
+        region%low(:) = insertion%lower
+        region%high(:) = insertion%upper
+        top = max(up*region%low(axis), up*region%high(axis))
+        support = huge(1.0_dp)
+        do b = 1, size(simulation%decomposition%boundaries)
+          support = min(support, support_of(simulation%decomposition%boundaries(b), b, axis, up, region))
+        end do
+        fall = 0.0_dp
+        if (support < top) fall = max(top - support - self%diameter, 0.0_dp)
+        self%entering_speed = max(self%entering_speed, sqrt(sum((abs(insertion%velocity) + insertion%spread)**2) + &
+          & 2.0_dp*norm2(self%acceleration)*fall))
+      end associate
+    end do
+  end subroutine find_entering
 
   !> Height of the lowest point of a boundary that carries grains, below the middle of the grains where it is a plane; huge
   !> where it carries none [m].

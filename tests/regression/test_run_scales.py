@@ -187,11 +187,29 @@ class Scales(RunTestCase):
         line = self.assert_heeded(case, words, {"time": {"step": 2e-3}})
         # 1.99 m and what the gaps leave: less than 2.01 m, more than 1.95 m
         self.figures(line, rf"a grain that falls {NUMBER} m to the lowest support moves by {NUMBER} mean radii", 1.99, 0.2 * math.sqrt(2 * G * 1.99))
+        # one that enters at 1 m/s has the same way to fall
+        enters = {"scene": {"dimension": 2, "bodies": "none"}, "time": {"step": 2e-3, "steps": 10}, "boundary": case["boundary"],
+                  "insertion": {"lower": [0.0, 1.9], "upper": [1.0, 2.0], "radius": 0.01, "rate": 100.0, "velocity": [0.0, -1.0]}}
+        line = self.assert_heeded(enters, "grains that enter are at up to")
+        speed = math.sqrt(1.0 + 2 * G * 1.98)
+        self.figures(line, rf"grains that enter are at up to {NUMBER} m/s where they have fallen to the lowest support, move by {NUMBER} mean radii",
+                     speed, 0.2 * speed)
         # upside down there is no support
         up = self.warnings(self.check_case(case, {"scene": {"gravity": [0.0, G]}, "time": {"step": 2e-3}}))
         self.assertEqual(up, [])
         column = {"scene": {"bodies": "column", "column_count": 100, "radius": 0.01, "mass": 1.0}, "time": {"step": 4e-3, "steps": 1}}
         self.assertEqual(self.warnings(self.check_case(column)), [], "a column has nowhere to fall")
+
+    def test_slip_scale(self):
+        """Errors of a tenth of g h are as large as the slip at which static friction is lost: ten layers that are shaken below their limit slide."""
+        law = {"material": {"name": "a"}, "scene": {"wall_material": "a"}}
+        slip = {"law": {"materials": "a", "kind": "velocity", "static_friction": 0.5, "dynamic_friction": 0.3, "slip_scale": 1e-3}}
+        error = 0.1 * G * 1e-3
+        lines = self.warnings(self.check_case(merged(LATTICE, law, slip, {"time": {"step": 1e-3}})))
+        self.assertEqual(len(lines), 1, lines)
+        self.figures(lines[0], rf"&law slip_scale = {NUMBER} m/s: solves may leave errors of {NUMBER} m/s, which take contacts out of their static friction; "
+                           rf"an accuracy of at most {NUMBER} would do", 1e-3, error, 0.05 / error * 1e-3)
+        self.assertEqual(self.warnings(self.check_case(merged(LATTICE, law, slip, {"time": {"step": 1e-3}, "solver": {"accuracy": 0.05}}))), [])
 
     def test_fast_boundaries(self):
         line = self.assert_heeded(SHEAR, "radii of the smallest grain", {"boundary": [{**SHEAR["boundary"][0], "velocity": [2.0, 0.0]}]})

@@ -261,6 +261,8 @@ def _group_of(groups, group, *rest):
             known = ", ".join(repr(one.get("name", number)) for number, one in enumerate(several, 1))
             raise CaseError(f"&{group} {which[0]!r}: {'no' if not own else 'more than one'} group of this name or number; expected one of {known}")
         return own[0]
+    if len(several) == 1:
+        return several[0]
     if isinstance(found, list):
         raise CaseError(f"&{group} {key}: the group stands several times; expected ('{group}', name, '{key}'), with the name or number of one of them")
     return found

@@ -76,6 +76,8 @@ module gravier_contact_law
     logical :: is_constant = .false.
     !> bodies of its two materials pass through each other: their pairs are never listed
     logical :: passes = .false.
+    !> slip by which its friction changes from static to dynamic; huge where it does not [m/s]
+    real(dp) :: slip_scale = huge(1.0_dp)
     !> the largest coefficients that it hands over; all but that of friction are the same for all its pairs
     type(coefficients_t) :: largest = coefficients_t()
     !> gap up to which bodies that have not been nearer act on each other [m]

@@ -42,6 +42,8 @@ module gravier_law_set
     logical :: attracts = .false., remembers = .false., yields = .false., of_spheres = .false.
     !> some law has pairs that break for good where they open or slide in a step
     logical :: breaks = .false.
+    !> smallest slip by which the friction of a law changes [m/s]
+    real(dp) :: slip_scale = huge(1.0_dp)
     !> the largest of all laws; range in [m]
     type(coefficients_t) :: largest
     real(dp) :: range = 0.0_dp
@@ -154,6 +156,7 @@ contains
       self%attracts = self%attracts .or. law%attracts
       self%remembers = self%remembers .or. law%remembers
       self%breaks = self%breaks .or. law%breaks
+      self%slip_scale = min(self%slip_scale, law%slip_scale)
       if (law%passes) call self%filter%add(a, b, size(self%of_pair, 1))
       self%yields = self%yields .or. law%yields
       self%of_spheres = self%of_spheres .or. law%of_spheres

@@ -11,8 +11,6 @@ module gravier_velocity_law
   type, extends(contact_law_t) :: velocity_law_t
     private
     real(dp) :: static_friction = 0.0_dp, dynamic_friction = 0.0_dp
-    !> [m/s]
-    real(dp) :: slip_scale = 1.0_dp
   contains
     procedure, nopass :: kind => velocity_kind
     procedure, nopass :: keys => velocity_keys
