@@ -21,6 +21,7 @@ module gravier_flat_piece
     procedure, nopass :: keys => segment_keys
     procedure :: set => segment_set
     procedure :: locate => segment_locate
+    procedure :: parts => segment_parts
   end type segment_t
 
   !> From `point`, a corner, along both edges.
@@ -31,6 +32,7 @@ module gravier_flat_piece
     procedure :: set => rectangle_set
     procedure :: locate => rectangle_locate
     procedure :: own_area => rectangle_own_area
+    procedure :: parts => rectangle_parts
   end type rectangle_t
 
 contains
@@ -126,6 +128,52 @@ contains
     class(rectangle_t), intent(in) :: self
     area = norm2(self%edge(:, 1))*norm2(self%edge(:, 2))
   end function rectangle_own_area
+
+  pure logical function segment_parts(self, from, to) result(parts)
+    class(segment_t), intent(in) :: self
+    real(dp), intent(in) :: from(3), to(3)
+    real(dp) :: normal(3), at(3)
+
+    normal(:) = 0.0_dp
+    normal(1) = -self%edge(2, 1)
+    normal(2) = self%edge(1, 1)
+    call cross_plane(normal, from, to, at, parts)
+    if (parts) parts = is_on_edge(at, self%edge(:, 1))
+  end function segment_parts
+
+  pure logical function rectangle_parts(self, from, to) result(parts)
+    class(rectangle_t), intent(in) :: self
+    real(dp), intent(in) :: from(3), to(3)
+    real(dp) :: normal(3), at(3)
+
+    normal(:) = cross(self%edge(:, 1), self%edge(:, 2))
+    call cross_plane(normal, from, to, at, parts)
+    if (parts) parts = is_on_edge(at, self%edge(:, 1))
+    if (parts) parts = is_on_edge(at, self%edge(:, 2))
+  end function rectangle_parts
+
+  !> Where the way between two points crosses the plane through the origin, if they are on its two sides.
+  pure subroutine cross_plane(normal, from, to, at, crosses)
+    real(dp), intent(in) :: normal(3), from(3), to(3)
+    real(dp), intent(out) :: at(3)
+    logical, intent(out) :: crosses
+    real(dp) :: first, second
+
+    first = sum(normal*from)
+    second = sum(normal*to)
+    crosses = (first > 0.0_dp .and. second < 0.0_dp) .or. (first < 0.0_dp .and. second > 0.0_dp)
+    at(:) = 0.0_dp
+    if (crosses) at(:) = from + first/(first - second)*(to - from)
+  end subroutine cross_plane
+
+  !> Whether the foot of a point on the line of an edge is on the edge.
+  pure logical function is_on_edge(at, edge)
+    real(dp), intent(in) :: at(3), edge(3)
+    real(dp) :: along
+
+    along = sum(at*edge)
+    is_on_edge = along >= 0.0_dp .and. along <= sum(edge*edge)
+  end function is_on_edge
 
   !> Length and direction of a vector from the foot of a point; on the surface the direction is the normal across two vectors.
   pure subroutine part(from, a, b, distance, normal)

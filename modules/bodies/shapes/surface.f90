@@ -73,6 +73,7 @@ module gravier_surface
     procedure :: own_area => surface_own_area
     procedure :: share_inside => surface_share_inside
     procedure :: shut => surface_shut
+    procedure :: parts => surface_parts
     procedure :: level => surface_level
     procedure :: support => surface_support
   end type surface_t
@@ -313,6 +314,17 @@ contains
     associate (unused => self%point(axis) + low + high)
     end associate
   end subroutine surface_shut
+
+  !> Whether it is a wall without a thickness that lies between two points.
+  pure logical function surface_parts(self, from, to) result(parts)
+    class(surface_t), intent(in) :: self
+    !> from the point of the surface (3) [m]
+    real(dp), intent(in) :: from(3), to(3)
+
+    parts = .false.
+    associate (unused => from(1) + to(1) + self%radius)
+    end associate
+  end function surface_parts
 
   !> Where the surface stands along an axis, if it faces along it.
   pure subroutine surface_level(self, axis, level, known)

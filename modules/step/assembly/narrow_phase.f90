@@ -8,6 +8,7 @@ module gravier_narrow_phase
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: local_bodies_t
   use gravier_wall_joints, only: joints_t, has_other
+  use gravier_screens, only: screens_t
   use gravier_surface_velocity, only: contact_place_t, round_place
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
@@ -81,10 +82,12 @@ contains
     integer :: w, p, i, j, c, nd
     real(dp) :: branch(decomposition%nd), distance, gap, alert
     type(joints_t) :: joints
+    type(screens_t) :: screens
 
     nd = decomposition%nd
     alert = decomposition%rule%alert_distance
     call joints%find(decomposition%boundaries)
+    call screens%find(decomposition%boundaries)
     call work%init(nd, physics%h, counts=.false.)
     do w = 1, view%list%n_watched()
       p = view%list%watched_place(w)
@@ -98,6 +101,9 @@ contains
         distance = norm2(branch)
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (is_far(view%list, p, gap, alert)) cycle
+        if (screens%exist) then
+          if (screens%part(decomposition, view%bodies, i, j, view%bodies%position(:, i), branch)) cycle
+        end if
         if (distance > 0.0_dp) then
           found%normal(:, c) = branch/distance
         else
@@ -161,8 +167,10 @@ contains
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
     type(shape_work_t) :: work
+    type(screens_t) :: screens
     integer :: w, p, k
 
+    call screens%find(decomposition%boundaries)
     call work%init(decomposition%nd, physics%h, counts=physics%laws%attracts .or. physics%laws%yields)
     w = 1
     do while (w <= view%list%n_watched())
@@ -170,6 +178,9 @@ contains
       call find_points(view, decomposition, p, work, points)
       call carry_memory(points, p, view%list)
       do k = 1, points%n
+        if (screens%exist) then
+          if (is_screened(screens, decomposition, view, p, points, k)) cycle
+        end if
         call write_point(points, k, p, found)
         found%place(found%n + 1) = place_of_point(view, decomposition%nd, p, points, k)
         call add_contact(view, decomposition, physics, found)
@@ -179,6 +190,27 @@ contains
     found%overlapping_cores = points%overlapping_cores
     found%points_left_out = points%left_out
   end subroutine find_contacts_of_shapes
+
+  !> Whether a wall without a thickness lies between the surfaces of two bodies at point `k` of pair `p`.
+  pure logical function is_screened(screens, decomposition, view, p, points, k) result(screened)
+    type(screens_t), intent(in) :: screens
+    type(decomposition_t), intent(in) :: decomposition
+    type(local_bodies_t), intent(in) :: view
+    integer, intent(in) :: p, k
+    type(pair_points_t), intent(in) :: points
+    !> part of the smaller radius that the bodies are thick there
+    real(dp), parameter :: depth = 0.05_dp
+    real(dp) :: branch(decomposition%nd), place(decomposition%nd)
+
+    screened = .false.
+    associate (i => view%list%candidate(p), j => view%list%antagonist(p), nd => decomposition%nd)
+      if (j < 0) return
+      branch(:) = (max(points%gap(k), 0.0_dp) + 2.0_dp*depth*min(view%bodies%radius(i), view%bodies%radius(j)))* &
+        & points%normal(1:nd, k)
+      place(:) = view%bodies%position(:, i) + points%point(1:nd, k) + 0.5_dp*branch
+      screened = screens%part(decomposition, view%bodies, i, j, place, branch)
+    end associate
+  end function is_screened
 
   !> Write point `k` of pair `p` behind the last contact of the list.
   pure subroutine write_point(points, k, p, found)
