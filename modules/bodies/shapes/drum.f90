@@ -106,8 +106,8 @@ contains
     end if
   end subroutine drum_locate
 
-  !> The share of a box that is inside: exact where the axis is along one of the box, else of `lines` times `lines` lines through the
-  !> box that cross the axis.
+  !> The share of a box that is inside: exact where the axis is along one of the box, else of `lines` times `lines` lines through
+  !> the box that cross the axis.
   pure real(dp) function drum_share_inside(self, low, high) result(share)
     class(circle_t), intent(in) :: self
     real(dp), intent(in) :: low(3), high(3)

@@ -25,8 +25,8 @@ module gravier_refinement
   !> share of the goal above which a smaller one is not worth aiming at, and tolerance of the residual that none falls below
   real(dp), parameter :: worth_it = 0.5_dp, least_tolerance = 1.0e-12_dp
 
-  !> share of the goal while bonds are in doubt, steps for which that lasts once they are not, and times that goal by which a bond may
-  !> move in a solve that comes to it, because the goal is a mean
+  !> share of the goal while bonds are in doubt, steps for which that lasts once they are not, and times that goal by which a bond
+  !> may move in a solve that comes to it, because the goal is a mean
   real(dp), parameter :: share_for_bonds = 0.01_dp, of_single_bond = 10.0_dp
   integer, parameter :: steps_for_bonds = 20
   !> steps, the last ones, that a bond waits for a solve that tells, until one to the goal of the user decides
@@ -56,8 +56,8 @@ module gravier_refinement
     integer, private :: doublings = 0
     !> the last solve might have come to a share of its goal; it did
     logical, private :: may_be_fine = .false., is_fine = .false.
-    !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone; steps,
-    !> the last ones, in which bonds were in doubt and solves came to no less error
+    !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone;
+    !> steps, the last ones, in which bonds were in doubt and solves came to no less error
     integer, private :: caution = 0, usual = 0, waited = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
@@ -87,8 +87,8 @@ contains
     end if
   end function refinement_doubt
 
-  !> Go on with a solve that has reached its goal and leaves bonds at their limits, so that it tells which of them break. The report is
-  !> that of both as of one. Collective.
+  !> Go on with a solve that has reached its goal and leaves bonds at their limits, so that it tells which of them break. The report
+  !> is that of both as of one. Collective.
   subroutine refinement_settle(self, problem, method, control, report, error, watch)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem

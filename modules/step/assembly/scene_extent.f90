@@ -13,10 +13,10 @@ module gravier_scene_extent
 
 contains
 
-  !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that shut
-  !> it in. In the place of planes that are not there it ends at the outermost points of the grains, or, if that is asked for, where a
-  !> circle or a cylinder along an axis ends that encloses it. Planes that have turned count where they are at the middle of the other
-  !> axes. No length where nothing bounds it. Collective.
+  !> Where the scene begins and ends along each axis, and its length there: the period, or else the way between the planes that
+  !> shut it in. In the place of planes that are not there it ends at the outermost points of the grains, or, if that is asked for,
+  !> where a circle or a cylinder along an axis ends that encloses it. Planes that have turned count where they are at the middle of
+  !> the other axes. No length where nothing bounds it. Collective.
   subroutine find_extent(decomposition, enclosed, low, high, length)
     type(decomposition_t), intent(in) :: decomposition
     !> it fills the circles and cylinders that enclose it
