@@ -140,10 +140,7 @@ contains
             & "at most "//figure(boundary%mass*scales%gain/error)//" kg would do")
         end associate
       end if
-      if (error > most_of_slip*simulation%physics%laws%slip_scale .and. solver%criterion == "velocity_error") call warn( &
-        & "&law slip_scale = "//figure(simulation%physics%laws%slip_scale)//" m/s: solves may leave errors of "//figure(error)// &
-        & " m/s, which take contacts out of their static friction; an accuracy of at most "// &
-        & figure(most_of_slip*solver%accuracy*simulation%physics%laws%slip_scale/error)//" would do, or a smaller &time step")
+      call warn(slip_warning(simulation, error))
       ! error over speed of the wall = 2 tolerance a/I = 2 tolerance load/(rate d), measured
       if (scales%shear .and. scales%load > 0.0_dp .and. solver%criterion == "residual") then
         most = error_share*scales%rate*d/(2.0_dp*scales%load)
@@ -173,6 +170,23 @@ contains
     end subroutine warn
 
   end subroutine scale_warnings
+
+  !> That errors of solves are more than a part of the smallest slip scale of a law; else empty.
+  function slip_warning(simulation, error) result(text)
+    type(simulation_t), intent(in) :: simulation
+    !> velocity error that solves may leave to the mean grain [m/s]
+    real(dp), intent(in) :: error
+    character(len=:), allocatable :: text
+    real(dp) :: most
+
+    text = ""
+    associate (slip => simulation%physics%laws%slip_scale, solver => simulation%config%solver)
+      if (.not. (error > most_of_slip*slip .and. solver%criterion == "velocity_error")) return
+      most = most_of_slip*solver%accuracy*slip/error
+      text = "&law slip_scale = "//figure(slip)//" m/s: solves may leave errors of "//figure(error)//" m/s, which take contacts "// &
+        & "out of their static friction; an accuracy of at most "//figure(most)//" would do, or a smaller &time step"
+    end associate
+  end function slip_warning
 
   !> That a cell is so light that it answers to a change of impulses by more than the contacts themselves; else empty.
   function cell_warning(simulation, diameter) result(text)
