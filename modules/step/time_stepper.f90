@@ -161,8 +161,8 @@ contains
     if (allocated(error)) return
     call self%assemble(figures)
     call solve(self, figures, error, watch)
-    if (.not. self%refinement%aims) call self%spot_checks%look(self%decomposition, self%problem, self%method, self%control, &
-      & figures%solve, error)
+    if (.not. (self%refinement%aims .or. self%refinement%is_fine)) call self%spot_checks%look(self%decomposition, &
+      & self%problem, self%method, self%control, figures%solve, error)
     call note_solve(self, figures, error)
     if (allocated(error) .or. figures%solve%status == solve_diverged) return
     call start_timer(phase_bodies)
@@ -209,7 +209,7 @@ contains
       else
         call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
       end if
-      if (self%physics%laws%breaks .and. .not. allocated(error)) then
+      if (self%physics%laws%breaks .and. .not. (allocated(error) .or. self%velocity_scale%moves())) then
         if (bonds_at_limit(self%problem, self%decomposition%boundaries, self%physics%laws, self%halo)) &
           & call self%refinement%settle(self%problem, self%method, control, figures%solve, error, watch)
       end if
@@ -367,7 +367,7 @@ contains
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%refinement%doubt(figures%uncertain_velocity(self%velocity_scale%bonds), &
       & self%control%accuracy*self%velocity_scale%value), self%halo, doubtful)
-    if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, figures%solve%iterations)
+    if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, self%velocity_scale%moves())
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)
@@ -396,7 +396,7 @@ contains
 
     if (allocated(error)) return
     associate (solve => figures%solve)
-      if (solve%status /= solve_converged .or. solve%refuted) self%failed = self%failed + 1
+      if (solve%status /= solve_converged) self%failed = self%failed + 1
       call self%tally%add_solve(solve, self%velocity_scale%kind)
       self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)

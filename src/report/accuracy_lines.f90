@@ -12,8 +12,6 @@ module gravier_accuracy_lines
     & creep_lines, goal_name, goal_text, mean_size_name, percent, plain
 
   character(len=*), parameter :: newline = new_line("a"), indent = "            "
-  !> steps in which bonds may be in doubt until solves aim at less error
-  integer, parameter :: few_in_doubt = 20
 
 contains
 
@@ -101,7 +99,10 @@ contains
       text = text//newline
       if (checks%reached == 0) return
       text = text//indent//"velocities were off by "//to_text(checks%mean(checks%found), 2)// &
-        & " of U, root mean square, and by their estimates "//to_text(checks%mean(checks%estimated), 2)//newline
+        & " of U, root mean square, and by their estimates "//to_text(checks%mean(checks%estimated), 2)
+      if (checks%beyond > 0) text = text//"; by more than twice the accuracy in "//to_text(checks%beyond)//" of "// &
+        & to_text(checks%reached)
+      text = text//newline
       text = text//indent//"forces of a single step were off by "//percent(checks%contacts%share())//" at contacts, "// &
         & percent(checks%stress%share())//" in the mean stress"//boundary_text(simulation)//newline
     end associate
@@ -170,9 +171,9 @@ contains
           text = text//to_text(refinement%reached)//" came to it, the others gave it up after "// &
             & counted(refinement%in_vain, "iteration")//" in all"//newline
         end if
-        if (refinement%in_doubt > few_in_doubt) text = text//indent//"in "//to_text(refinement%in_doubt)// &
-          & " steps solves did not tell whether bonds at their limits break: a larger &solver max_iterations helps, of which "// &
-          & "they take a quarter"//newline
+        if (refinement%in_doubt > 0) text = text//indent//"in "//to_text(refinement%in_doubt)// &
+          & " steps solves to less error did not tell whether bonds at their limits break: a larger &solver max_iterations "// &
+          & "helps, of which they take a quarter"//newline
       end if
       if (.not. drifts(simulation)) return
       way = drift%length()/simulation%velocity_scale%diameter

@@ -209,7 +209,7 @@ contains
     end do
     if (simulation%effort%solves == 0) return
     text = "converged   "//converged_text(simulation)//newline
-    if (simulation%failed > 0) text = text//"to mend it  "//mending_text(simulation)//newline
+    if (simulation%failed > 0 .or. simulation%spot_checks%refute()) text = text//"to mend it  "//mending_text(simulation)//newline
     text = text//"time        "//time_text(phases, seconds, simulation%effort%solves)//newline// &
       & "to halve it "//halving_text(simulation, phases, seconds, looser_seconds)//newline
   end function summary_lines

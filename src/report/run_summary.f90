@@ -38,6 +38,8 @@ contains
       if (simulation%failed == 0 .and. is_doubtful(simulation)) then
         text = "only by the "//trim(simulation%config%solver%criterion)//": every solve reached the "//goal_text(simulation)// &
           & ", but "//doubts_text(simulation)
+      else if (simulation%failed == 0 .and. simulation%spot_checks%refute()) then
+        text = "NO: "//checks_text(simulation)
       else if (simulation%failed == 0) then
         text = "yes: every solve reached the "//goal_text(simulation)
         if (goal_name(simulation) /= "accuracy") text = text//" and the accuracy "//to_text(simulation%config%solver%accuracy, 3)
@@ -75,10 +77,10 @@ contains
     character(len=:), allocatable :: text
 
     associate (tally => simulation%tally, solver => simulation%config%solver, fallback => simulation%fallback)
-      if (tally%missed() == 0) then
-        text = "the solves that missed it were made before the restart"
-      else if (2*tally%refuted > tally%missed()) then
+      if (simulation%failed == 0) then
         text = "a smaller &solver accuracy: the estimates that end solves are too small in this scene"
+      else if (tally%missed() == 0) then
+        text = "the solves that missed it were made before the restart"
       else if (misses_residual_only(simulation) .or. (goal_name(simulation) == "tolerance" .and. &
         & tally%worst_error <= solver%accuracy .and. tally%unbounded + tally%diverged == 0)) then
         text = "velocities are within the accuracy "//to_text(solver%accuracy, 3)//": a larger &solver tolerance, now "// &
@@ -101,6 +103,17 @@ contains
       end if
     end associate
   end function mending_text
+
+  !> How many solves spot checks have found wrong.
+  function checks_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (checks => simulation%spot_checks)
+      text = to_text(checks%beyond)//" of "//counted(checks%reached, "solve")//" that spot checks continued were off by more "// &
+        & "than twice the "//goal_text(simulation)//", though all reached it by their estimates"
+    end associate
+  end function checks_text
 
   !> Whether solves reached a criterion that does not tell the velocity error, and are not known to be within the accuracy.
   pure logical function is_doubtful(simulation)
@@ -137,7 +150,6 @@ contains
     associate (tally => simulation%tally)
       text = ""
       if (simulation%failed > tally%missed()) text = ", "//to_text(simulation%failed - tally%missed())//" missed before the restart"
-      call add(tally%refuted, "found wrong by spot checks")
       call add(tally%stagnated, "stagnated")
       call add(tally%unbounded, "found no solution")
       call add(tally%exhausted, "ended at max_iterations")
@@ -171,6 +183,8 @@ contains
         else
           text = text//goal_name(simulation)//": the accuracy of the results is not known"
         end if
+      else if (simulation%spot_checks%refute()) then
+        text = "*** "//checks_text(simulation)
       else if (is_doubtful(simulation)) then
         text = "every solve reached the "//trim(simulation%config%solver%criterion)//" "// &
           & to_text(simulation%config%solver%tolerance, 2)//", but "//doubts_text(simulation)

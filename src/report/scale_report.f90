@@ -183,8 +183,9 @@ contains
     associate (slip => simulation%physics%laws%slip_scale, solver => simulation%config%solver)
       if (.not. (error > most_of_slip*slip .and. solver%criterion == "velocity_error")) return
       most = most_of_slip*solver%accuracy*slip/error
-      text = "&law slip_scale = "//figure(slip)//" m/s: solves may leave errors of "//figure(error)//" m/s, which take contacts "// &
-        & "out of their static friction; an accuracy of at most "//figure(most)//" would do, or a smaller &time step"
+      text = "&law slip_scale = "//figure(slip)//" m/s: solves may leave errors of "//figure(error)// &
+        & " m/s, which take contacts out of their static friction; an accuracy of at most "//figure(most)// &
+        & " would do, or a smaller &time step"
     end associate
   end function slip_warning
 

@@ -271,7 +271,7 @@ contains
         call log%line("ended       after step "//to_text(simulation%step)//" of "//to_text(simulation%config%time%steps)//": "// &
           & self%stop_reason, error)
       end if
-      if (simulation%failed > 0) self%status = status_unconverged
+      if (simulation%failed > 0 .or. simulation%spot_checks%refute()) self%status = status_unconverged
       if (interruption%stops) then
         self%status = status_failure
         call log%line("interrupted *** "//interruption%reason//" after step "//to_text(simulation%step)//" of "// &

@@ -29,14 +29,12 @@ module gravier_refinement
   !> may move in a solve that comes to it, because the goal is a mean
   real(dp), parameter :: share_for_bonds = 0.01_dp, of_single_bond = 10.0_dp
   integer, parameter :: steps_for_bonds = 20
-  !> steps, the last ones, that a bond waits for a solve that tells, until one to the goal of the user decides
-  integer, parameter :: most_waited = 20
   !> iterations that it may take at least, and times those of the solve to the goal of the user
-  integer, parameter :: iterations_for_bonds = 1000, times_for_bonds = 4
+  integer, parameter :: iterations_for_bonds = 2500, times_for_bonds = 4
 
   !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
-  integer, parameter :: refinement_words = 5 + backoff_words
-  character(len=*), parameter :: refinement_record = "turns doublings caution usual waited "//backoff_record
+  integer, parameter :: refinement_words = 4 + backoff_words
+  character(len=*), parameter :: refinement_record = "turns doublings caution usual "//backoff_record
 
   type :: refinement_t
     !> since this run began or went on from a checkpoint: solves that aimed at less error, those of them that came to it, and
@@ -54,16 +52,16 @@ module gravier_refinement
     integer, private :: turns = 0
     !> how often the iterations that they may take were doubled
     integer, private :: doublings = 0
-    !> the last solve might have come to a share of its goal; it did
-    logical, private :: may_be_fine = .false., is_fine = .false.
-    !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone;
-    !> steps, the last ones, in which bonds were in doubt and solves came to no less error
-    integer, private :: caution = 0, usual = 0, waited = 0
+    !> the last solve came to the share of its goal
+    logical :: is_fine = .false.
+    !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone
+    integer, private :: caution = 0, usual = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
     procedure :: doubt => refinement_doubt
     procedure :: settle => refinement_settle
     procedure :: note_bonds => refinement_note_bonds
+    procedure :: take_care => refinement_take_care
     procedure :: decide => refinement_decide
     procedure :: solve => refinement_solve
     procedure :: get_state => refinement_get_state
@@ -72,19 +70,14 @@ module gravier_refinement
 
 contains
 
-  !> The velocity up to which the last solve may be wrong about the bodies of a bond at its limit; huge where the next one is waited
-  !> for [m/s].
+  !> The velocity up to which the last solve may be wrong about the bodies of a bond at its limit [m/s].
   pure real(dp) function refinement_doubt(self, uncertain, goal) result(doubt)
     class(refinement_t), intent(in) :: self
     !> by the estimate of the solve; the error that the user allows [m/s]
     real(dp), intent(in) :: uncertain, goal
 
     doubt = uncertain
-    if (self%is_fine) then
-      doubt = max(uncertain, of_single_bond*share_for_bonds*goal)
-    else if (self%may_be_fine .and. self%waited < most_waited) then
-      doubt = huge(1.0_dp)
-    end if
+    if (self%is_fine) doubt = max(uncertain, of_single_bond*share_for_bonds*goal)
   end function refinement_doubt
 
   !> Go on with a solve that has reached its goal and leaves bonds at their limits, so that it tells which of them break. The report
@@ -100,13 +93,13 @@ contains
     class(solve_watch_t), intent(inout), optional :: watch
     type(solve_report_t) :: further
 
-    if (self%aims .or. report%status /= solve_converged .or. control%criterion /= by_velocity) return
+    if (self%aims .or. report%status /= solve_converged .or. .not. may_settle(method, control)) return
     self%turns = self%turns + 1
     if (.not. self%backoff%allows(self%turns)) return
     self%caution = steps_for_bonds
     self%usual = report%iterations
     self%share = share_for_bonds
-    call attempt(self, problem, method, control, further, error, watch)
+    call attempt(self, problem, method, control, .true., further, error, watch)
     if (allocated(error)) return
     if (further%status == solve_converged) then
       further%goal = control%accuracy
@@ -121,18 +114,29 @@ contains
     method%work%solves = method%work%solves - 1
   end subroutine refinement_settle
 
-  !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks.
-  pure subroutine refinement_note_bonds(self, doubtful, iterations)
-    class(refinement_t), intent(inout) :: self
-    logical, intent(in) :: doubtful
-    !> of the solve
-    integer, intent(in) :: iterations
+  !> Whether solves can go on for bonds: iterations of methods of direct solves are too dear.
+  pure logical function may_settle(method, control) result(may)
+    class(method_t), intent(in) :: method
+    type(solve_control_t), intent(in) :: control
+    may = control%criterion == by_velocity .and. .not. method%keeps_best
+  end function may_settle
 
-    if (.not. self%aims .and. self%caution < steps_for_bonds) self%usual = iterations
-    self%waited = merge(self%waited + 1, 0, doubtful .and. .not. self%is_fine)
-    if (self%waited > 0) self%in_doubt = self%in_doubt + 1
+  !> Solves aim at less error from now on, because some bond may be at its limit.
+  pure subroutine refinement_take_care(self)
+    class(refinement_t), intent(inout) :: self
+    self%caution = steps_for_bonds
+  end subroutine refinement_take_care
+
+  !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks, and whether bodies move. Where
+  !> they move by more than errors are compared with, as in impacts, solves to the goal of the user tell enough.
+  pure subroutine refinement_note_bonds(self, doubtful, moves)
+    class(refinement_t), intent(inout) :: self
+    logical, intent(in) :: doubtful, moves
+
+    if (doubtful .and. .not. (self%is_fine .or. moves)) self%in_doubt = self%in_doubt + 1
     self%caution = max(0, self%caution - 1)
-    if (doubtful) self%caution = steps_for_bonds
+    if (doubtful) call self%take_care()
+    if (moves) self%caution = 0
   end subroutine refinement_note_bonds
 
   !> Whether the next solve aims at a share of its goal: not where that is hardly smaller, or where too many solves before did not
@@ -144,7 +148,6 @@ contains
     !> that is asked for where no bond is in doubt
     real(dp), intent(in) :: share
 
-    self%may_be_fine = control%criterion == by_velocity
     self%is_fine = .false.
     self%share = share
     if (self%caution > 0) self%share = min(share, share_for_bonds)
@@ -169,7 +172,7 @@ contains
     type(solve_report_t) :: first
     type(solve_control_t) :: further
 
-    call attempt(self, problem, method, control, first, error, watch)
+    call attempt(self, problem, method, control, .false., first, error, watch)
     if (allocated(error)) return
     if (first%status == solve_converged) then
       report = first
@@ -186,17 +189,21 @@ contains
     method%work%solves = method%work%solves - 1
   end subroutine refinement_solve
 
-  !> Aim at a share of the goal. Impulses of a solve that found none are those of its start. Collective.
-  subroutine attempt(self, problem, method, control, report, error, watch)
+  !> Aim at a share of the goal. Impulses of a solve that found none are those of its start, and those of one in vain, if that is
+  !> asked for. Collective.
+  subroutine attempt(self, problem, method, control, goes_back, report, error, watch)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
+    !> after an attempt in vain
+    logical, intent(in) :: goes_back
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
     type(kept_impulses_t) :: kept(size(problem%sub))
     type(solve_control_t) :: further
+    real(dp) :: unused(2)
 
     further = control
     further%accuracy = self%share*control%accuracy
@@ -220,10 +227,12 @@ contains
       call self%backoff%note(self%turns, tried=self%doublings == most_doublings, kept=.false.)
       self%doublings = min(self%doublings + 1, most_doublings)
     end if
-    if (report%status /= solve_diverged .and. report%status /= solve_unbounded) return
+    if (report%status == solve_converged) return
+    if (.not. goes_back .and. report%status /= solve_diverged .and. report%status /= solve_unbounded) return
     call restore_impulses(problem, kept)
     if (problem%cell%is_driven) call respond(problem)
     call problem%evaluate()
+    call problem%residual(unused(1), unused(2))
   end subroutine attempt
 
   pure subroutine refinement_get_state(self, words)
@@ -234,8 +243,7 @@ contains
     words(2) = self%doublings
     words(3) = self%caution
     words(4) = self%usual
-    words(5) = self%waited
-    call self%backoff%get_state(words(6:))
+    call self%backoff%get_state(words(5:))
   end subroutine refinement_get_state
 
   pure subroutine refinement_set_state(self, words)
@@ -246,8 +254,7 @@ contains
     self%doublings = narrow(words(2))
     self%caution = narrow(words(3))
     self%usual = narrow(words(4))
-    self%waited = narrow(words(5))
-    call self%backoff%set_state(words(6:))
+    call self%backoff%set_state(words(5:))
   end subroutine refinement_set_state
 
 end module gravier_refinement

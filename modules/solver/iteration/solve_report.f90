@@ -68,8 +68,6 @@ module gravier_solve_report
     !> whether the velocities are within the accuracy, whatever the criterion; whether that is known, as it is not after few
     !> iterations. Both hold of solves that have converged alone.
     logical :: accurate = .true., judged = .true.
-    !> it has converged by its estimate, and a spot check has found its velocity error beyond the goal
-    logical :: refuted = .false.
     !> sweeps over all contacts that a pass over layers took, 0 where there was none; whether the solve went on from it
     real(dp) :: layered_sweeps = 0.0_dp
     logical :: layered = .false.

@@ -26,8 +26,6 @@ module gravier_run_tally
     !> solves that reached another criterion than the velocity error: those that missed the accuracy, those that ended too soon to
     !> tell
     integer(i8) :: inaccurate = 0, unjudged = 0
-    !> solves that reached the velocity error by their estimate, and were found wrong by a spot check
-    integer(i8) :: refuted = 0
     !> steps made, and those in which projections of overlaps shifted grains by more than rounding
     integer(i8) :: steps = 0, projected = 0
     !> means over the free grains of the lengths by which projections shifted them, and of their paths by their velocities [m]
@@ -87,9 +85,7 @@ contains
     self%solves = self%solves + 1
     select case (solve%status)
     case (solve_converged)
-      if (solve%refuted) then
-        self%refuted = self%refuted + 1
-      else if (.not. solve%judged) then
+      if (.not. solve%judged) then
         self%unjudged = self%unjudged + 1
       else if (.not. solve%accurate) then
         self%inaccurate = self%inaccurate + 1
@@ -167,7 +163,7 @@ contains
   !> Solves that missed their criterion.
   pure integer(i8) function run_tally_missed(self) result(missed)
     class(run_tally_t), intent(in) :: self
-    missed = self%stagnated + self%unbounded + self%exhausted + self%diverged + self%refuted
+    missed = self%stagnated + self%unbounded + self%exhausted + self%diverged
   end function run_tally_missed
 
   !> Share of the steps in which overlaps were projected.

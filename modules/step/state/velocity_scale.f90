@@ -86,6 +86,7 @@ module gravier_velocity_scale
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
     real(dp), allocatable :: lever(:)
   contains
+    procedure :: moves => velocity_scale_moves
     procedure :: init => velocity_scale_init
     procedure :: measure => velocity_scale_measure
     procedure :: load_of => velocity_scale_load_of
@@ -196,6 +197,12 @@ contains
     ! what a drive that starts carries is not at rest: here the present velocities count
     if (motion%difference > 0.0_dp) problem%drive_scale = max(motion%difference, self%creep)
   end subroutine velocity_scale_measure
+
+  !> Whether bodies move by more than what errors are compared with.
+  pure logical function velocity_scale_moves(self) result(moves)
+    class(velocity_scale_t), intent(in) :: self
+    moves = self%own > self%value
+  end function velocity_scale_moves
 
   !> Squares of the impulses of attraction and their number.
   pure subroutine add_attraction(sub, sums)

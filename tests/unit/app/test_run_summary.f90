@@ -3,8 +3,7 @@ program test_run_summary
   use gravier_kinds, only: dp
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_timers, only: n_phases, phase_factorise, phase_interface_solve, phase_neighbourhood, phase_output
-  use gravier_run_summary, only: halving_text, converged_text, mending_text
-  use gravier_solve_report, only: solve_report_t, solve_converged
+  use gravier_run_summary, only: halving_text, converged_text, mending_text, verdict_text
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_scene
   use gravier_check, only: check, finish_checks
@@ -53,23 +52,24 @@ contains
     call simulation%free()
   end subroutine test_newton
 
-  !> Solves that converged by their estimate, and that spot checks have found wrong: they have missed the accuracy.
+  !> Solves that reached the accuracy by their estimates, of which spot checks have found too many wrong: the run has not converged.
   subroutine test_refuted()
     type(simulation_t) :: simulation
-    type(solve_report_t) :: solve
 
     call make_scene(comm, column//"&time step = 0.01, steps = 2 /", simulation)
-    solve%status = solve_converged
-    call simulation%tally%add_solve(solve, "load of a step")
-    solve%refuted = .true.
-    call simulation%tally%add_solve(solve, "load of a step")
-    simulation%failed = 1
     simulation%step = 2
-    call check(index(converged_text(simulation), "NO: 1 of 2 solves did not reach the accuracy") == 1, "one of two has missed it")
-    call check(index(converged_text(simulation), "; 1 found wrong by spot checks") > 0, "how it is known")
+    simulation%tally%steps = 2
+    simulation%spot_checks%reached = 4
+    simulation%spot_checks%beyond = 1
+    call check(index(converged_text(simulation), "yes") == 1, "one of four says nothing")
+    simulation%spot_checks%beyond = 2
+    call check(index(converged_text(simulation), "NO: 2 of 4 solves that spot checks continued were off by more than twice the "// &
+      & "accuracy 1.00E-01, though all reached it by their estimates") == 1, "two of four")
+    call check(index(verdict_text(simulation), "*** 2 of 4 solves that spot checks continued") == 1, "the last words")
     call check(index(mending_text(simulation), "a smaller &solver accuracy") == 1, "what mends it")
+    simulation%failed = 1
     simulation%tally%stagnated = 1
-    call check(index(mending_text(simulation), "a smaller &solver accuracy") == 0, "most of those that missed it did not")
+    call check(index(mending_text(simulation), "a smaller &solver accuracy") == 0, "not where solves missed it")
     call simulation%free()
   end subroutine test_refuted
 
