@@ -54,6 +54,8 @@ module gravier_refinement
     integer, private :: doublings = 0
     !> the last solve came to the share of its goal
     logical :: is_fine = .false.
+    !> impulses of an attempt in vain are those of its start
+    logical, private :: goes_back = .false.
     !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone
     integer, private :: caution = 0, usual = 0
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
@@ -99,7 +101,8 @@ contains
     self%caution = steps_for_bonds
     self%usual = report%iterations
     self%share = share_for_bonds
-    call attempt(self, problem, method, control, .true., further, error, watch)
+    self%goes_back = .true.
+    call attempt(self, problem, method, control, further, error, watch)
     if (allocated(error)) return
     if (further%status == solve_converged) then
       further%goal = control%accuracy
@@ -172,7 +175,8 @@ contains
     type(solve_report_t) :: first
     type(solve_control_t) :: further
 
-    call attempt(self, problem, method, control, .false., first, error, watch)
+    self%goes_back = .false.
+    call attempt(self, problem, method, control, first, error, watch)
     if (allocated(error)) return
     if (first%status == solve_converged) then
       report = first
@@ -191,13 +195,11 @@ contains
 
   !> Aim at a share of the goal. Impulses of a solve that found none are those of its start, and those of one in vain, if that is
   !> asked for. Collective.
-  subroutine attempt(self, problem, method, control, goes_back, report, error, watch)
+  subroutine attempt(self, problem, method, control, report, error, watch)
     class(refinement_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(inout) :: method
     type(solve_control_t), intent(in) :: control
-    !> after an attempt in vain
-    logical, intent(in) :: goes_back
     type(solve_report_t), intent(out) :: report
     type(error_t), allocatable, intent(inout) :: error
     class(solve_watch_t), intent(inout), optional :: watch
@@ -228,7 +230,7 @@ contains
       self%doublings = min(self%doublings + 1, most_doublings)
     end if
     if (report%status == solve_converged) return
-    if (.not. goes_back .and. report%status /= solve_diverged .and. report%status /= solve_unbounded) return
+    if (.not. self%goes_back .and. report%status /= solve_diverged .and. report%status /= solve_unbounded) return
     call restore_impulses(problem, kept)
     if (problem%cell%is_driven) call respond(problem)
     call problem%evaluate()

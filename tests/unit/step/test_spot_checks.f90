@@ -117,8 +117,8 @@ contains
     call sim%free()
   end subroutine test_found
 
-  !> The velocity error is 0.25 of the scale: more than twice a goal of 0.12, less than twice one of 0.13. Two of such checks, more than
-  !> one in twenty, say that the estimates are too small.
+  !> The velocity error is 0.25 of the scale: more than twice a goal of 0.12, less than twice one of 0.13. Two of such checks, more
+  !> than one in twenty, say that the estimates are too small.
   subroutine test_refuted()
     type(simulation_t) :: sim
     type(solve_control_t) :: control
