@@ -171,8 +171,8 @@ contains
           text = text//to_text(refinement%reached)//" came to it, the others gave it up after "// &
             & counted(refinement%in_vain, "iteration")//" in all"//newline
         end if
-        if (refinement%in_doubt > 0) text = text//indent//"in "//to_text(refinement%in_doubt)// &
-          & " steps solves to less error did not tell whether bonds at their limits break: a larger &solver max_iterations "// &
+        if (refinement%in_doubt > 0) text = text//indent//"in "//counted(refinement%in_doubt, "step")// &
+          & " solves to less error did not tell whether bonds at their limits break: a larger &solver max_iterations "// &
           & "helps, of which they take a quarter"//newline
       end if
       if (.not. drifts(simulation)) return

@@ -323,8 +323,8 @@ contains
       self%control%check_every = config%solver%check_every
       self%control%trace = config%output%trace
       self%spot_checks%part = config%solver%spot_checks
-      ! loads that act from the first step on bring bonds near to their limits at once
-      if (self%physics%laws%breaks) call self%refinement%take_care()
+      ! loads that act from the first step on bring bonds near to their limits at once; iterations of direct solves are too dear
+      if (self%physics%laws%breaks .and. config%solver%method /= "newton") call self%refinement%take_care()
       self%written_steps = schedule_t(every=config%output%every, last=config%time%steps)
       self%dumped_step = config%output%fclib_step
       if (config%scene%bodies == "column") allocate (self%exact, source=column_solution_t(config%scene%column_count, &

@@ -130,16 +130,16 @@ contains
     self%caution = steps_for_bonds
   end subroutine refinement_take_care
 
-  !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks, and whether bodies move. Where
-  !> they move by more than errors are compared with, as in impacts, solves to the goal of the user tell enough.
-  pure subroutine refinement_note_bonds(self, doubtful, moves)
+  !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks. Ordinary solves have to do where
+  !> bodies move by more than errors are compared with, as in impacts, and of methods whose iterations are too dear.
+  pure subroutine refinement_note_bonds(self, doubtful, ordinary)
     class(refinement_t), intent(inout) :: self
-    logical, intent(in) :: doubtful, moves
+    logical, intent(in) :: doubtful, ordinary
 
-    if (doubtful .and. .not. (self%is_fine .or. moves)) self%in_doubt = self%in_doubt + 1
+    if (doubtful .and. .not. (self%is_fine .or. ordinary)) self%in_doubt = self%in_doubt + 1
     self%caution = max(0, self%caution - 1)
     if (doubtful) call self%take_care()
-    if (moves) self%caution = 0
+    if (ordinary) self%caution = 0
   end subroutine refinement_note_bonds
 
   !> Whether the next solve aims at a share of its goal: not where that is hardly smaller, or where too many solves before did not
