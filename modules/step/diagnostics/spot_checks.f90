@@ -223,18 +223,10 @@ contains
     real(dp), intent(in) :: on_boundaries(:, :), moments(:)
     real(dp), allocatable :: better(:, :), better_moments(:)
     real(dp) :: parts(2, size(problem%sub)), sums(2)
-    integer :: s, b, c
+    integer :: s, b
 
-    parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (nd => problem%kernels%nd, sub => problem%sub(s))
-        do c = 1, sub%n_contacts
-          associate (before => kept(s)%value(lane_of(c), 1:nd, block_of(c)), now => sub%impulse(lane_of(c), 1:nd, block_of(c)))
-            parts(1, s) = parts(1, s) + sum((before - now)**2)
-            parts(2, s) = parts(2, s) + sum(now**2)
-          end associate
-        end do
-      end associate
+      call add_contacts(problem%kernels%nd, problem%sub(s)%n_contacts, kept(s)%value, problem%sub(s)%impulse, parts(:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     call self%contacts%add(sums(1), sums(2))
@@ -252,6 +244,23 @@ contains
     class(spot_checks_t), intent(in) :: self
     refute = self%beyond >= least_wrong .and. real(self%beyond, dp) > may_be_wrong*real(self%reached, dp)
   end function spot_checks_refute
+
+  !> Squares of the differences of impulses and of the impulses of the contacts of a subdomain.
+  pure subroutine add_contacts(nd, n_contacts, before, now, part)
+    integer, intent(in) :: nd, n_contacts
+    !> (lanes, nc, blocks) [N s]
+    real(dp), intent(in) :: before(:, :, :), now(:, :, :)
+    real(dp), intent(out) :: part(2)
+    integer :: c, d
+
+    part(:) = 0.0_dp
+    do c = 1, n_contacts
+      do d = 1, nd
+        part(1) = part(1) + (before(lane_of(c), d, block_of(c)) - now(lane_of(c), d, block_of(c)))**2
+        part(2) = part(2) + now(lane_of(c), d, block_of(c))**2
+      end do
+    end do
+  end subroutine add_contacts
 
   !> How many times the iterations of a solve a tenth of its goal takes; at least so many, where some checks were given up.
   pure real(dp) function spot_checks_times(self) result(times)
