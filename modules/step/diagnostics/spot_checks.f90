@@ -226,7 +226,7 @@ contains
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call add_contacts(problem%kernels%nd, problem%sub(s)%n_contacts, kept(s)%value, problem%sub(s)%impulse, parts(:, s))
+      call add_contacts(problem%kernels%nf, problem%sub(s)%n_contacts, kept(s)%value, problem%sub(s)%impulse, parts(:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     call self%contacts%add(sums(1), sums(2))
@@ -246,8 +246,9 @@ contains
   end function spot_checks_refute
 
   !> Squares of the differences of impulses and of the impulses of the contacts of a subdomain.
-  pure subroutine add_contacts(nd, n_contacts, before, now, part)
-    integer, intent(in) :: nd, n_contacts
+  pure subroutine add_contacts(nf, n_contacts, before, now, part)
+    !> components of a force, one where no contact has friction; contacts
+    integer, intent(in) :: nf, n_contacts
     !> (lanes, nc, blocks) [N s]
     real(dp), intent(in) :: before(:, :, :), now(:, :, :)
     real(dp), intent(out) :: part(2)
@@ -255,7 +256,7 @@ contains
 
     part(:) = 0.0_dp
     do c = 1, n_contacts
-      do d = 1, nd
+      do d = 1, nf
         part(1) = part(1) + (before(lane_of(c), d, block_of(c)) - now(lane_of(c), d, block_of(c)))**2
         part(2) = part(2) + now(lane_of(c), d, block_of(c))**2
       end do
