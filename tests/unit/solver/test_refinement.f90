@@ -299,6 +299,7 @@ contains
     report%iterations = 7
     call refinement%settle(sim%problem, method, control, report, error)
     call check_close(on_ground(sim), 2.0_dp, 1.0e-4_dp, "bonds: less error")
+    call check_close(refinement%least_share, 0.01_dp, 0.0_dp, "bonds: a hundredth of the goal")
     call check(report%iterations > 7, "bonds: iterations of both")
     call check_close(report%goal, 1.0e-3_dp, 0.0_dp, "bonds: the goal of the user")
     call check_equal(int(method%work%solves), 1, "bonds: one solve")
