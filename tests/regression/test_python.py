@@ -214,6 +214,10 @@ class Package(RunTestCase):
                                ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$")):
             with self.assertRaisesRegex(gravier.CaseError, words):
                 list(gravier.study(base, changes, self.here("none")))
+        # a group that stands once is a list of one in what parse_namelist returns
+        parsed = {group: keys if isinstance(keys, list) else [keys] for group, keys in base.items()}
+        for point, place, status in gravier.study(parsed, {("time", "steps"): [2]}, self.here("parsed")):
+            self.assertEqual((point, status), ({("time", "steps"): 2}, 0), place)
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
             list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
         # one of several groups, by its name or its number
