@@ -9,8 +9,9 @@ module gravier_inflow_lines
   public :: inflow_warnings, entering_lines, population_lines
 
   character(len=*), parameter :: newline = new_line("a")
-  !> fraction of a region that grains placed at random fill without much searching, in 2D and 3D
-  real(dp), parameter :: easily_filled(2:3) = [0.35_dp, 0.2_dp]
+  !> fraction of a region that grains of about one radius fill which enter it as fast as they find places, in 2D and 3D: measured,
+  !> from rest and with a velocity
+  real(dp), parameter :: filled(2:3) = [0.45_dp, 0.27_dp]
 
 contains
 
@@ -44,9 +45,9 @@ contains
             & to_text(rate*simulation%physics%h, 3)//" in a step, in which at most "//to_text(most_a_step)// &
             & " of an insertion enter: several insertions or smaller steps let more of them enter"//newline
         end if
-        stay = min(time_in_region(insertion, simulation%physics%gravity), simulation%config%time%steps*simulation%physics%h)
+        stay = min(mean_stay(insertion, simulation%physics%gravity), simulation%config%time%steps*simulation%physics%h)
         if (.not. stay > 0.0_dp) cycle
-        most = easily_filled(insertion%nd)*insertion%volume()/(insertion%radii%mean_volume()*stay)
+        most = filled(insertion%nd)*insertion%volume()/(insertion%radii%mean_volume()*stay)
         if (.not. rate > most .or. most*stay > insertion%most_grains) cycle
         number = number + 1
         text = text//"warning     &insertion '"//insertion%name//"': "//to_text(rate, 3)//" grains a second are more than its "// &
@@ -66,12 +67,16 @@ contains
     exceeds = rate*step > most_a_step .and. insertion%planned(steps*step) > most_a_step
   end function exceeds_steps
 
-  !> Time in which a grain crosses a region along its velocity, or along gravity; huge where neither moves it [s].
-  pure real(dp) function time_in_region(insertion, gravity) result(time)
+  !> Mean time that grains stay in a region they enter wherever there is a place, if their velocity or gravity takes them out; huge
+  !> where neither moves them [s]. T is the time for the whole length. Grains that enter with a constant velocity v find places
+  !> where the others come from alone, and stay T. Gravity draws grains that enter at rest apart, so that there are places
+  !> everywhere, and the mean of the times from there is 2 T/3. In between, with the speed w after the whole length, it is taken as
+  !> T (2 w + v)/(3 w).
+  pure real(dp) function mean_stay(insertion, gravity) result(time)
     type(insertion_t), intent(in) :: insertion
     !> [m/s^2]
     real(dp), intent(in) :: gravity(3)
-    real(dp) :: way(3), speed, along, length
+    real(dp) :: way(3), speed, last_speed, along, length
 
     time = huge(1.0_dp)
     speed = norm2(insertion%velocity)
@@ -81,9 +86,9 @@ contains
     way(:) = way/norm2(way)
     length = dot_product(abs(way), insertion%upper - insertion%lower)
     along = max(dot_product(gravity, way), 0.0_dp)
-    ! length = speed t + along t^2/2
-    time = 2.0_dp*length/(speed + sqrt(speed**2 + 2.0_dp*along*length))
-  end function time_in_region
+    last_speed = sqrt(speed**2 + 2.0_dp*along*length)
+    time = 2.0_dp*length/(speed + last_speed)*(2.0_dp*last_speed + speed)/(3.0_dp*last_speed)
+  end function mean_stay
 
   !> How many grains are to enter, a line each insertion, and the bytes that they take at least.
   function entering_lines(simulation, bytes) result(text)

@@ -21,6 +21,8 @@ module gravier_run_log
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
+  use gravier_late_events, only: late_warnings
+  use gravier_intact_bonds, only: count_bonds
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
   use gravier_start_lines, only: banner_text, start_lines
@@ -215,14 +217,19 @@ contains
       & "energy [J]  wall [s]   remaining", error)
   end subroutine run_log_write_head
 
-  !> What the first solve starts from, where the bodies file gives contacts with forces.
-  subroutine run_log_write_started(self, figures, error)
+  !> What the first solve starts from, where the bodies file gives contacts with forces, and how many bonds there are after the
+  !> first step. Collective.
+  subroutine run_log_write_started(self, simulation, figures, error)
     class(run_log_t), intent(inout) :: self
+    type(simulation_t), intent(in) :: simulation
     type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: per_mille, bonds
 
-    integer(i8) :: per_mille
-
+    if (simulation%step == 1 .and. simulation%physics%laws%breaks) then
+      bonds = count_bonds(simulation%halo, simulation%decomposition, simulation%physics%laws)
+      call self%line("bonds       "//to_text(bonds)//" after the first step", error)
+    end if
     associate (started => figures%started)
       if (started%given == 0) return
       ! rounded down, so that 100.0 are all
@@ -261,6 +268,9 @@ contains
     warnings = warnings + number
     text = text//more
     call region_warnings(simulation, more, number)
+    warnings = warnings + number
+    text = text//more
+    call late_warnings(simulation, more, number)
     warnings = warnings + number
     call write_lines(self, text//more, "", error)
   end subroutine run_log_write_scales

@@ -195,6 +195,23 @@ class Insertion(RunTestCase):
         np.testing.assert_array_equal(radius[0][:n], radius[1][:n])
         self.assertIn("a second are more than its region has places for", run.stdout)
 
+    def test_how_many_find_places(self):
+        """The rate that the warning gives is the one at which grains enter a full region and leave it, within a quarter."""
+        cases = {"disks at rest": (2, [0.0, 0.1], [0.2, 0.3], 0.005, [0.0, 0.0]), "spheres at rest": (3, [0.0, 0.0, 0.1], [0.06, 0.06, 0.2], 0.004, [0.0] * 3),
+                 "spheres with a velocity": (3, [0.0, 0.0, 0.1], [0.06, 0.06, 0.2], 0.004, [0.0, 0.0, -1.0])}
+        for name, (nd, lower, upper, radius, velocity) in cases.items():
+            with self.subTest(name):
+                case = {"scene": {"dimension": nd, "bodies": "none"}, "time": {"step": H, "steps": 300}, "output": {"every": 0},
+                        "boundary": [{"name": "out", "shape": "outlet", "normal": [0.0] * (nd - 1) + [1.0]}],
+                        "insertion": {"lower": lower, "upper": upper, "radius": radius, "velocity": velocity, "rate": 1e5}}
+                run = run_case(case, directory=self.here(name))
+                self.assert_status(run, 0)
+                said = float(re.search(r"before those that entered have left it, about (\S+) a second: a larger region or velocity lets them enter",
+                                       run.stdout).group(1))
+                rows = run.history()
+                entered = rows["entered"][rows["time"] > 0.15 - 1e-9].sum() / 0.15
+                self.assertLess(abs(said / entered - 1.0), 0.25, (said, entered))
+
     def test_as_fast_as_places_are_found(self):
         run = run_case(merged(changed(rate=None, count=100), {"time": {"steps": 120}}), directory=self.here("filled"))
         self.assert_status(run, 0)

@@ -200,6 +200,16 @@ class Scales(RunTestCase):
         column = {"scene": {"bodies": "column", "column_count": 100, "radius": 0.01, "mass": 1.0}, "time": {"step": 4e-3, "steps": 1}}
         self.assertEqual(self.warnings(self.check_case(column)), [], "a column has nowhere to fall")
 
+    def test_events_after_the_end(self):
+        """What a run ends before: insertions that begin and boundaries that are removed at its end or later; not what comes in its last step."""
+        case = {"scene": {"dimension": 2, "bodies": "none"}, "time": {"step": 1e-3, "steps": 400},
+                "boundary": [{"name": "gate", "shape": "plane", "normal": [0.0, 1.0], "remove_at": 0.4}],
+                "insertion": {"name": "late", "lower": [0.0, 0.1], "upper": [0.1, 0.2], "radius": 0.01, "rate": 10.0, "start": 0.5}}
+        lines = self.warnings(self.check_case(case))
+        self.assertEqual(lines, ["warning     &insertion 'late': start = 5.00000E-01 s, and the run ends at 4.00000E-01 s, before grains enter",
+                                 "warning     &boundary 'gate': remove_at = 4.00000E-01 s, and the run ends at 4.00000E-01 s, before it is removed"])
+        self.assertEqual(self.warnings(self.check_case(case, {"time": {"steps": 501}})), [])
+
     def test_slip_scale(self):
         """Errors of a tenth of g h are as large as the slip at which static friction is lost: ten layers that are shaken below their limit slide."""
         law = {"material": {"name": "a"}, "scene": {"wall_material": "a"}}

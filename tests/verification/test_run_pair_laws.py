@@ -344,6 +344,7 @@ class Bonds(SmallScene):
                 # between the layers, and in the two that are not glued; between two layers they are torn
                 across, beside = n**(dimension - 1), (dimension - 1) * (n - 1) * n**(dimension - 2)
                 self.assertEqual(set(history["bonds"][:torn - 9]), {3 * across + 2 * beside})
+                self.assertIn(f"bonds       {3 * across + 2 * beside} after the first step\n", record.run.stdout)
                 self.assertLessEqual(history["bonds"][-1], 2 * across + 2 * beside)
         self.both(check)
 

@@ -4,9 +4,8 @@ module gravier_fallback
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
-  use gravier_cell_response, only: respond
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, return_to
   use gravier_method, only: method_t
   use gravier_backoff, only: backoff_t, backoff_words, backoff_record
   use gravier_solve, only: solve_contacts
@@ -92,9 +91,7 @@ contains
       call join(report, second)
       return
     end if
-    call restore_impulses(problem, kept)
-    if (problem%cell%is_driven) call respond(problem)
-    call problem%evaluate()
+    call return_to(problem, kept)
     report%iterations = report%iterations + second%iterations
     report%seconds = report%seconds + second%seconds
   end subroutine fallback_take_over

@@ -5,9 +5,8 @@ module gravier_refinement
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_narrow, only: narrow
-  use gravier_cell_response, only: respond
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, return_to
   use gravier_method, only: method_t
   use gravier_backoff, only: backoff_t, backoff_words, backoff_record
   use gravier_solve, only: solve_contacts
@@ -205,7 +204,6 @@ contains
     class(solve_watch_t), intent(inout), optional :: watch
     type(kept_impulses_t) :: kept(size(problem%sub))
     type(solve_control_t) :: further
-    real(dp) :: unused(2)
 
     further = control
     further%accuracy = self%share*control%accuracy
@@ -231,10 +229,7 @@ contains
     end if
     if (report%status == solve_converged) return
     if (.not. self%goes_back .and. report%status /= solve_diverged .and. report%status /= solve_unbounded) return
-    call restore_impulses(problem, kept)
-    if (problem%cell%is_driven) call respond(problem)
-    call problem%evaluate()
-    call problem%residual(unused(1), unused(2))
+    call return_to(problem, kept)
   end subroutine attempt
 
   pure subroutine refinement_get_state(self, words)

@@ -2,11 +2,14 @@
 !> that those between bodies that sleep are among them.
 module gravier_intact_bonds
   use gravier_kinds, only: dp, i8
+  use gravier_decomposition, only: decomposition_t
+  use gravier_halo, only: halo_t
+  use gravier_law_set, only: law_set_t
   use gravier_pair_laws, only: law_of
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
   implicit none
   private
-  public :: intact_bonds_t
+  public :: intact_bonds_t, count_bonds
 
   type, extends(diagnostic_t) :: intact_bonds_t
     !> at the end of the step; between bodies with shapes each point of contact has one
@@ -29,23 +32,30 @@ contains
   subroutine intact_bonds_measure(self, step)
     class(intact_bonds_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
+
+    self%bonds = count_bonds(step%halo, step%decomposition, step%physics%laws)
+  end subroutine intact_bonds_measure
+
+  !> Bonds of all ranks at the end of a step. Collective.
+  integer(i8) function count_bonds(halo, decomposition, laws) result(bonds)
+    type(halo_t), intent(in) :: halo
+    type(decomposition_t), intent(in) :: decomposition
+    type(law_set_t), intent(in) :: laws
     integer :: s, p, l
 
-    self%bonds = 0
-    associate (laws => step%physics%laws)
-      if (.not. laws%breaks) return
-      do s = 1, size(step%halo%view)
-        associate (view => step%halo%view(s))
-          do p = 1, view%list%n
-            if (view%list%state(view%list%memory%law_row, p) == 0) cycle
-            l = law_of(view, step%decomposition%boundaries, laws, p)
-            if (laws%of(l)%law%breaks) self%bonds = self%bonds + 1
-          end do
-        end associate
-      end do
-    end associate
-    self%bonds = step%decomposition%comm%total(self%bonds)
-  end subroutine intact_bonds_measure
+    bonds = 0
+    if (.not. laws%breaks) return
+    do s = 1, size(halo%view)
+      associate (view => halo%view(s))
+        do p = 1, view%list%n
+          if (view%list%state(view%list%memory%law_row, p) == 0) cycle
+          l = law_of(view, decomposition%boundaries, laws, p)
+          if (laws%of(l)%law%breaks) bonds = bonds + 1
+        end do
+      end associate
+    end do
+    bonds = decomposition%comm%total(bonds)
+  end function count_bonds
 
   subroutine intact_bonds_columns(self, list)
     class(intact_bonds_t), intent(in) :: self

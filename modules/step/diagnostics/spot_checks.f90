@@ -6,10 +6,9 @@ module gravier_spot_checks
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_body_mass, only: inverse_of_translation
-  use gravier_cell_response, only: respond
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
-  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, return_to
   use gravier_method, only: method_t, work_t
   use gravier_solve, only: solve_contacts
   use gravier_solve_report, only: solve_control_t, solve_report_t, by_velocity, solve_converged
@@ -131,7 +130,6 @@ contains
     type(solve_control_t) :: further
     type(solve_report_t) :: report
     type(work_t) :: work
-    real(dp) :: unused(2)
     integer :: s
 
     work = method%work
@@ -158,10 +156,7 @@ contains
       call compare_velocities(self, problem, velocities, control%accuracy, solve)
       call compare_forces(self, decomposition, problem, kept, on_boundaries, moments)
     end if
-    call restore_impulses(problem, kept)
-    if (problem%cell%is_driven) call respond(problem)
-    call problem%evaluate()
-    call problem%residual(unused(1), unused(2))
+    call return_to(problem, kept)
     method%work = work
   end subroutine continue_solve
 

@@ -1,0 +1,55 @@
+!> What the log says of events that a run ends before: insertions that begin and boundaries that are removed only after its end.
+module gravier_late_events
+  use gravier_kinds, only: dp
+  use gravier_text, only: to_text
+  use gravier_simulation, only: simulation_t
+  implicit none
+  private
+  public :: late_warnings
+
+  character(len=*), parameter :: newline = new_line("a")
+
+contains
+
+  !> Warnings, each a line ended by a newline, and their number.
+  subroutine late_warnings(simulation, text, number)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    !> of the last step [s]
+    real(dp) :: end
+    integer :: i
+
+    text = ""
+    number = 0
+    end = simulation%time + (simulation%config%time%steps - simulation%step)*simulation%physics%h
+    do i = 1, size(simulation%inflow%insertions)
+      associate (insertion => simulation%inflow%insertions(i))
+        if (insertion%start >= end .and. end > simulation%time) call warn("&insertion", insertion%name, "start", insertion%start, &
+          & "grains enter")
+      end associate
+    end do
+    do i = 1, size(simulation%decomposition%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(i))
+        if (boundary%remove_at >= end .and. boundary%remove_at < huge(end) .and. end > simulation%time) &
+          & call warn("&boundary", boundary%name, "remove_at", boundary%remove_at, "it is removed")
+      end associate
+    end do
+
+  contains
+
+    subroutine warn(group, name, key, value, event)
+      character(len=*), intent(in) :: group, name, key
+      !> [s]
+      real(dp), intent(in) :: value
+      !> what does not happen
+      character(len=*), intent(in) :: event
+
+      number = number + 1
+      text = text//"warning     "//group//" '"//name//"': "//key//" = "//to_text(value, 6)//" s, and the run ends at "// &
+        & to_text(end, 6)//" s, before "//event//newline
+    end subroutine warn
+
+  end subroutine late_warnings
+
+end module gravier_late_events
