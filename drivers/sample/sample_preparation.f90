@@ -8,6 +8,7 @@ module gravier_sample_preparation
   use gravier_body_store, only: body_set_t
   use gravier_solve_report, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
+  use gravier_sample_container, only: hold_still
   use gravier_load_areas, only: facing_area
   use gravier_scene_extent, only: find_extent
   use gravier_contact_kernels, only: lane_of, block_of
@@ -47,6 +48,7 @@ contains
 
     status = status_ok
     loads = config
+    call hold_still(loads)
     if (config%sample%preparation == "compacted") then
       loads%scene%gravity(:) = 0.0_dp
       loads%scene%gravity_table = ""
@@ -60,6 +62,7 @@ contains
       call free_planes(simulation)
       call log%line("loads       pressure "//to_text(config%sample%pressure, 4)//" on the upper planes; no gravity", error)
     end if
+    if (size(config%boundaries) > 0) call log%line("boundaries  stand still until the grains are at rest", error)
     call log%write_head(error)
     call comm%agree(error)
     call rest%init(simulation)
@@ -203,11 +206,14 @@ contains
     type(run_log_t), intent(inout) :: log
     type(rest_t), intent(in) :: rest
     type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: fraction
     integer :: b
 
-    call log%line("sample      "//to_text(simulation%n_grains)//" grains, solid fraction "// &
-      & fixed(solid_fraction(simulation), 4)//", contacts per grain "//fixed(contacts_per_grain(simulation), 3)// &
-      & ", largest overlap "//fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii"// &
+    fraction = ""
+    if (simulation%config%sample%container == "box") fraction = ", solid fraction "//fixed(solid_fraction(simulation), 4)
+    call log%line("sample      "//to_text(simulation%n_grains)//" grains"//fraction//", contacts per grain "// &
+      & fixed(contacts_per_grain(simulation), 3)//", largest overlap "// &
+      & fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii"// &
       & trim(merge(" of rigid contacts", "                  ", simulation%physics%laws%yields))//", "// &
       & to_text(simulation%step)//" steps", error)
     call write_size(simulation, log, error)

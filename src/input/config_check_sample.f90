@@ -2,6 +2,7 @@
 module gravier_config_check_sample
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
+  use gravier_surface_registry, only: wall_of_bodies
   use gravier_config_types, only: config_t
   use gravier_config_check_grains, only: check_grains
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text
@@ -21,6 +22,7 @@ contains
     call check_grains(report, config, "sample", config%sample%grains_config_t, error)
     call check_box(report, config, error)
     call check_preparation(report, config, error)
+    if (config%sample%container == "boundaries") call check_container(report, config, error)
     call expect(report, config%sample%file /= "", "sample", "file", error)
     call expect(report, has_ending(config%sample%file, ".h5") .or. has_ending(config%sample%file, ".hdf5"), "sample", "file", &
                 error, "a name with the ending .h5 or .hdf5")
@@ -78,5 +80,24 @@ contains
       call expect(report, sample%max_steps >= 1, "sample", "max_steps", error)
     end associate
   end subroutine check_preparation
+
+  !> Boundaries that hold the grains are there, with a box that says where to look for places.
+  subroutine check_container(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+
+    associate (sample => config%sample)
+      call expect(report, size(config%boundaries) > 0, "sample", "container", error, "'box' where the case has no &boundary")
+      call expect(report, all(config%boundaries%shape /= wall_of_bodies), "sample", "container", error, &
+                  "'box' where a &boundary has shape = 'wall': boundaries that hold the grains leave no other walls")
+      call expect(report, sample%preparation /= "compacted", "sample", "container", error, &
+                  "'box' where preparation = 'compacted': the planes of the box compact the grains")
+      call expect(report, sample%arrangement == "loose", "sample", "container", error, &
+                  "'box' where arrangement = 'lattice': a lattice fills the whole box")
+      call expect(report, sample%box(config%scene%dimension) > 0.0_dp, "sample", "box", error, &
+                  "sizes > 0 along all axes where container = 'boundaries'")
+    end associate
+  end subroutine check_container
 
 end module gravier_config_check_sample

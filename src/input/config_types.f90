@@ -268,6 +268,11 @@ module gravier_config_types
     character(len=choice_length) :: arrangement
     !> none, settled or compacted
     character(len=choice_length) :: preparation
+    !> box or boundaries
+    character(len=choice_length) :: container
+    !> m, boundaries: the middle of the box where it is not given
+    real(dp) :: inner_point(3)
+    logical :: inner_point_given = .false.
     !> grains
     integer :: count
     !> m; the period along a periodic axis; the last may be 0: found from solid_fraction; the third is 0 in 2D

@@ -6,7 +6,8 @@ module gravier_user_bodies
   use gravier_sorting, only: argsort
   use gravier_magnitude, only: is_bounded, is_size, bounded_text, size_text, sharpest, far_text
   use gravier_motion, only: grain_mass
-  use gravier_inflow, only: placed_t, is_clear
+  use gravier_free_places, only: is_clear
+  use gravier_inflow, only: placed_t
   use gravier_config_laws, only: density_of
   use gravier_user_loop, only: user_loop_t
   implicit none

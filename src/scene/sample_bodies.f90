@@ -8,6 +8,7 @@ module gravier_sample_bodies
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_walls, find_own_rows
   use gravier_motion, only: grain_mass
   use gravier_placed_grains, only: sample_box_t
+  use gravier_held_box, only: held_box_t
   use gravier_radius_distribution, only: radius_distribution_t
   use gravier_lattice_packing, only: lattice_t, cell_edge
   use gravier_loose_packing, only: place_loosely
@@ -15,6 +16,7 @@ module gravier_sample_bodies
   use gravier_config_laws, only: density_of
   use gravier_shape_library, only: shape_library_t
   use gravier_sample_shapes, only: draw_shapes
+  use gravier_sample_container, only: set_container
   implicit none
   private
   public :: make_lattice, make_sample, set_radii, farthest_place
@@ -77,7 +79,7 @@ contains
   subroutine check_box(comm, config, box, data, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
-    type(sample_box_t), intent(in) :: box
+    class(sample_box_t), intent(in) :: box
     !> radii are known
     type(bodies_data_t), intent(in) :: data
     type(error_t), allocatable, intent(inout) :: error
@@ -100,10 +102,10 @@ contains
     far = -comm%highest(-far)
   end function farthest_place
 
-  !> The sample of &sample before any preparation: grains at rest with identifiers from 1, a plane on each side of the box
-  !> that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period. Grains with shapes
-  !> are placed by the balls that hold them. Failure (status_input): a table of radii that cannot be read, grains that find no
-  !> place in the box, shapes that the library does not have. Errors are the same on all ranks. Collective.
+  !> The sample of &sample before any preparation: grains at rest with identifiers from 1, and, if not boundaries hold them, a plane
+  !> on each side of the box that is not periodic, but a lid only where the grains are to be compacted; the box is that of the
+  !> period. Grains with shapes are placed by the balls that hold them. Failure (status_input): a table of radii that cannot be
+  !> read, grains that find no place, shapes that the library does not have. Errors are the same on all ranks. Collective.
   subroutine make_sample(comm, config, shapes, data, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -112,7 +114,7 @@ contains
     type(bodies_data_t), intent(out) :: data
     type(error_t), allocatable, intent(inout) :: error
     type(radius_distribution_t) :: radii
-    type(sample_box_t) :: box
+    type(held_box_t) :: box
 
     call set_radii(comm, config%sample%grains_config_t, config%scene%dimension, radii, error)
     if (allocated(error)) return
@@ -129,6 +131,8 @@ contains
       call place_in_lattice(config%sample%seed, radii%largest(), box, data, error)
     else
       if (.not. config%sample%box(box%nd) > 0.0_dp) call set_height(comm, config, data, box)
+      call set_container(comm, config, radii%largest(), box, error)
+      if (allocated(error)) return
       call place_loosely(comm, box, config%sample%seed, data%id, data%radius, data%position, error)
     end if
     if (allocated(error)) then
@@ -136,7 +140,11 @@ contains
       return
     end if
     if (shapes%n > 0) call draw_shapes(comm, config, shapes, data, error)
-    call make_planes(box, config%sample%preparation == "compacted", data, error)
+    if (box%is_held) then
+      call allocate_walls(data, box%nd, 0, "planes", error)
+    else
+      call make_planes(box, config%sample%preparation == "compacted", data, error)
+    end if
     data%has_box = any(box%periodic)
     data%origin(:) = config%scene%period_origin
     data%period(:) = config%scene%period
@@ -189,7 +197,7 @@ contains
     integer, intent(in) :: seed
     !> [m]
     real(dp), intent(in) :: largest
-    type(sample_box_t), intent(inout) :: box
+    class(sample_box_t), intent(inout) :: box
     type(bodies_data_t), intent(inout) :: data
     type(error_t), allocatable, intent(inout) :: error
     type(lattice_t) :: lattice
@@ -205,7 +213,7 @@ contains
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
-    type(sample_box_t), intent(inout) :: box
+    class(sample_box_t), intent(inout) :: box
     integer :: nd
 
     nd = box%nd
@@ -216,7 +224,7 @@ contains
   !> Planes on the sides of the box that are not periodic, facing inwards: the floor, the two sides across each other axis,
   !> and the lid.
   subroutine make_planes(box, lid, data, error)
-    type(sample_box_t), intent(in) :: box
+    class(sample_box_t), intent(in) :: box
     logical, intent(in) :: lid
     type(bodies_data_t), intent(inout) :: data
     type(error_t), allocatable, intent(inout) :: error

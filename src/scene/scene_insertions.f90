@@ -9,7 +9,7 @@ module gravier_scene_insertions
   use gravier_boundary, only: boundary_t
   use gravier_shape_library, only: shape_library_t
   use gravier_insertion, only: insertion_t
-  use gravier_inflow, only: is_clear
+  use gravier_free_places, only: is_clear
   use gravier_config_types, only: config_t, insertion_config_t
   use gravier_config_laws, only: material_number, density_of
   use gravier_sample_bodies, only: set_radii

@@ -26,7 +26,7 @@ module gravier_loose_packing
 
   !> The state of a placement on one rank.
   type :: placement_t
-    type(sample_box_t) :: box
+    class(sample_box_t), allocatable :: box
     type(bricks_t) :: bricks
     integer :: seed = 0
     !> of all grains of all ranks [m]
@@ -57,11 +57,12 @@ contains
   !> Random sequential addition, largest grains first, in rounds: every grain without a place tries some random places; the
   !> first that is clear of all placed grains becomes its proposal; a proposal stands unless it overlaps one of a larger
   !> grain, or one of a grain of the same radius and a smaller identifier. Grains of one radius fill up to about 0.35 of a
-  !> large box in 3D and 0.53 in 2D, wider distributions more. Failure (status_input, without the name of a file or key): a
-  !> grain wider than the box, or grains that find no place. Errors are the same on all ranks. Collective.
+  !> large box in 3D and 0.53 in 2D, wider distributions more. Places where boundaries leave no room are not tried. Failure
+  !> (status_input, without the name of a file or key): a grain wider than the box, or grains that find no place. Errors are the
+  !> same on all ranks. Collective.
   subroutine place_loosely(comm, box, seed, id, radius, position, error)
     type(communicator_t), intent(in) :: comm
-    type(sample_box_t), intent(in) :: box
+    class(sample_box_t), intent(in) :: box
     integer, intent(in) :: seed
     !> identifiers of the grains of this rank, no two alike on any ranks (n)
     integer(i8), intent(in), contiguous :: id(:)
@@ -80,7 +81,7 @@ contains
     placement%largest = comm%highest(maxval(radius))
     call check_width(box, placement%largest, error)
     if (allocated(error)) return
-    placement%box = box
+    allocate (placement%box, source=box)
     placement%seed = seed
     placement%id = id
     placement%radius = radius
@@ -116,7 +117,7 @@ contains
   !> Say how full the box was to be. Collective.
   subroutine raise_too_dense(comm, box, radius, left, error)
     type(communicator_t), intent(in) :: comm
-    type(sample_box_t), intent(in) :: box
+    class(sample_box_t), intent(in) :: box
     real(dp), intent(in), contiguous :: radius(:)
     !> grains of the class that was given up
     integer(i8), intent(in) :: left
@@ -132,7 +133,7 @@ contains
     end do
     fraction = comm%sum_real(volume)/box%volume()
     total = comm%total(size(radius, kind=i8))
-    call raise(error, status_input, "solid fraction "//to_text(fraction, 3)//" is too high: of "//to_text(total)// &
+    call raise(error, status_input, box%too_many(fraction)//": of "//to_text(total)// &
       & " grains, "//to_text(left)//" found no place; random places take up to "//merge("0.53", "0.35", box%nd == 2)// &
       & " of grains of one radius, less in a narrow box")
   end subroutine raise_too_dense
@@ -200,6 +201,7 @@ contains
       g = self%waiting(w)
       do t = 1, self%trials
         call self%trial_place(g, self%tried + t, position)
+        if (.not. self%box%leaves_room(self%radius(g), position)) cycle
         record(1) = comm%rank
         record(2) = w
         record(3) = t

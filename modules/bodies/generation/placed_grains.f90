@@ -2,6 +2,7 @@
 module gravier_placed_grains
   use gravier_kinds, only: dp, i4, i8
   use gravier_narrow, only: narrow
+  use gravier_text, only: to_text
   implicit none
   private
   public :: sample_box_t, placed_grains_t
@@ -18,6 +19,8 @@ module gravier_placed_grains
     logical :: periodic(3) = .false.
   contains
     procedure :: random_place => box_random_place
+    procedure :: leaves_room => box_leaves_room
+    procedure :: too_many => box_too_many
     procedure :: volume => box_volume
   end type sample_box_t
 
@@ -73,6 +76,29 @@ contains
       end if
     end do
   end subroutine box_random_place
+
+  !> Whether there is room for a grain at a place in the box, but for other grains.
+  pure logical function box_leaves_room(self, radius, position) result(room)
+    class(sample_box_t), intent(in) :: self
+    !> [m]; (nd) [m]
+    real(dp), intent(in) :: radius, position(:)
+
+    associate (unused_self => self, unused_radius => radius, unused_position => position)
+    end associate
+    room = .true.
+  end function box_leaves_room
+
+  !> What is wrong where grains find no places.
+  pure function box_too_many(self, fraction) result(text)
+    class(sample_box_t), intent(in) :: self
+    !> that all grains fill of the box
+    real(dp), intent(in) :: fraction
+    character(len=:), allocatable :: text
+
+    associate (unused => self)
+    end associate
+    text = "solid fraction "//to_text(fraction, 3)//" is too high"
+  end function box_too_many
 
   !> [m^nd]
   pure real(dp) function box_volume(self) result(volume)

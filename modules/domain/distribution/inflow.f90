@@ -7,11 +7,11 @@ module gravier_inflow
   use gravier_body_store, only: body_set_t, append_bodies
   use gravier_placed_grains, only: sample_box_t, placed_grains_t
   use gravier_insertion, only: insertion_t, new_grain_t, candidates_a_grain, insertion_words
-  use gravier_boundary, only: boundary_t
+  use gravier_free_places, only: is_clear
   use gravier_decomposition, only: decomposition_t
   implicit none
   private
-  public :: inflow_t, placed_t, is_clear, given_words, given_record
+  public :: inflow_t, placed_t, given_words, given_record
 
   !> words of the account of grains that a loop of the user's own has placed
   integer, parameter :: given_words = 2
@@ -354,25 +354,6 @@ contains
     end do
     apart = .true.
   end function is_apart
-
-  !> Whether a grain at a place overlaps no boundary and no outlet.
-  pure logical function is_clear(boundaries, radius, position) result(clear)
-    type(boundary_t), intent(in) :: boundaries(:)
-    !> [m]; (nd) [m]
-    real(dp), intent(in) :: radius, position(:)
-    real(dp) :: distance, normal(size(position))
-    integer :: b
-
-    clear = .false.
-    do b = 1, size(boundaries)
-      associate (boundary => boundaries(b))
-        if (.not. boundary%present .or. boundary%is_glued()) cycle
-        call boundary%locate(position, distance, normal)
-        if (distance < radius) return
-      end associate
-    end do
-    clear = .true.
-  end function is_clear
 
   !> Make the bodies of the grains that have been placed, where a subdomain of this rank holds their places. Their identifiers are
   !> larger than all others, so that bodies stay in the order of theirs, and each in its place.

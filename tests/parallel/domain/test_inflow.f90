@@ -11,7 +11,8 @@ program test_inflow
   use gravier_surface_registry, only: make_surface
   use gravier_insertion, only: insertion_words, new_grain_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_inflow, only: inflow_t, given_words, is_clear
+  use gravier_free_places, only: is_clear
+  use gravier_inflow, only: inflow_t, given_words
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
   real(dp), parameter :: h = 1.0e-3_dp

@@ -1554,7 +1554,8 @@ contains
     call accept(sample("count = 10 radius = 0.5 box = 4"), "a sample to write back", config)
     call write_active(text, config)
     call check_equal(text(index(text, "&sample"):index(text, "&time") - 1), "&sample" // newline &
-      // "  arrangement = 'loose'" // newline // "  preparation = 'none'" // newline // "  count = 10" // newline &
+      // "  arrangement = 'loose'" // newline // "  preparation = 'none'" // newline // "  container = 'box'" // newline &
+      // "  count = 10" // newline &
       // "  radii = 'single'" // newline // "  radius = 0.5" // newline // "  box = 4.0, 0.0, 0.0" // newline &
       // "  solid_fraction = 0.35" // newline // "  seed = 1" // newline // "  file = 'sample.h5'" // newline &
       // "/" // newline, "a sample written back")

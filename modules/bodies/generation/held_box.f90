@@ -1,0 +1,50 @@
+!> Boxes with boundaries in or around them, which grains keep clear of, and which may hold the grains.
+module gravier_held_box
+  use gravier_kinds, only: dp
+  use gravier_boundary, only: boundary_t
+  use gravier_free_places, only: is_clear, is_seen
+  use gravier_placed_grains, only: sample_box_t
+  implicit none
+  private
+  public :: held_box_t
+
+  type, extends(sample_box_t) :: held_box_t
+    type(boundary_t), allocatable :: boundaries(:)
+    !> whether they hold the grains, which are then to be seen from the inner point
+    logical :: is_held = .false.
+    !> [m]
+    real(dp) :: inner_point(3) = 0.0_dp
+  contains
+    procedure :: leaves_room => held_box_leaves_room
+    procedure :: too_many => held_box_too_many
+  end type held_box_t
+
+contains
+
+  !> Whether boundaries leave a grain its place: it overlaps none, and none that holds the grains is before it.
+  pure logical function held_box_leaves_room(self, radius, position) result(room)
+    class(held_box_t), intent(in) :: self
+    !> [m]; (nd) [m]
+    real(dp), intent(in) :: radius, position(:)
+
+    room = .true.
+    if (.not. allocated(self%boundaries)) return
+    room = is_clear(self%boundaries, radius, position)
+    if (room .and. self%is_held) room = is_seen(self%boundaries, self%inner_point(1:self%nd), radius, position)
+  end function held_box_leaves_room
+
+  !> What is wrong where grains find no places.
+  pure function held_box_too_many(self, fraction) result(text)
+    class(held_box_t), intent(in) :: self
+    !> that all grains fill of the box
+    real(dp), intent(in) :: fraction
+    character(len=:), allocatable :: text
+
+    if (self%is_held) then
+      text = "too many grains for the space that the boundaries leave them in the box"
+    else
+      text = self%sample_box_t%too_many(fraction)
+    end if
+  end function held_box_too_many
+
+end module gravier_held_box
