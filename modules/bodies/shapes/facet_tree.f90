@@ -1,9 +1,13 @@
 !> A tree of boxes around facets, by which those near a point are found without a look at all.
 module gravier_facet_tree
   use gravier_kinds, only: dp
+  use gravier_rotation, only: cross
   implicit none
   private
   public :: facet_tree_t, box_distance
+
+  !> part of a facet by which it is taken to be larger, so that no line passes between two that share an edge
+  real(dp), parameter :: seam = 1.0e-9_dp
 
   !> facets of a leaf, at most
   integer, parameter :: of_leaf = 4
@@ -22,6 +26,7 @@ module gravier_facet_tree
   contains
     procedure :: build => facet_tree_build
     procedure :: find => facet_tree_find
+    procedure :: parts => facet_tree_parts
   end type facet_tree_t
 
 contains
@@ -164,6 +169,73 @@ contains
       end do
     end do
   end subroutine facet_tree_find
+
+  !> Whether a facet lies between two points: the line from one to the other goes through it.
+  pure logical function facet_tree_parts(self, corner, from, to) result(parts)
+    class(facet_tree_t), intent(in) :: self
+    !> (3, corners of a facet, facets), those that the tree was built of [m]
+    real(dp), intent(in), contiguous :: corner(:, :, :)
+    real(dp), intent(in) :: from(3), to(3)
+    real(dp) :: low(3), high(3)
+    integer :: stack(most_levels), top, node, k
+
+    parts = .false.
+    if (self%n_nodes == 0) return
+    low(:) = min(from, to)
+    high(:) = max(from, to)
+    top = 1
+    stack(1) = 1
+    do while (top > 0)
+      node = stack(top)
+      top = top - 1
+      if (any(self%low(:, node) > high) .or. any(self%high(:, node) < low)) cycle
+      if (self%half(node) > 0) then
+        stack(top + 1) = self%half(node) + 1
+        stack(top + 2) = self%half(node)
+        top = top + 2
+        cycle
+      end if
+      do k = self%first(node), self%last(node)
+        parts = goes_through(corner(:, :, self%order(k)), from, to)
+        if (parts) return
+      end do
+    end do
+  end function facet_tree_parts
+
+  !> Whether a line goes through a triangle, or in the plane through a segment.
+  pure logical function goes_through(corner, from, to) result(through)
+    real(dp), intent(in), contiguous :: corner(:, :)
+    real(dp), intent(in) :: from(3), to(3)
+    real(dp), dimension(3) :: normal, edge, other, foot, turned
+    real(dp) :: before, behind
+    integer :: c
+
+    edge(:) = corner(:, 2) - corner(:, 1)
+    if (size(corner, 2) == 2) then
+      normal(1) = -edge(2)
+      normal(2) = edge(1)
+      normal(3) = 0.0_dp
+    else
+      other(:) = corner(:, 3) - corner(:, 1)
+      normal(:) = cross(edge, other)
+    end if
+    before = dot_product(normal, from - corner(:, 1))
+    behind = dot_product(normal, to - corner(:, 1))
+    through = (before > 0.0_dp) .neqv. (behind > 0.0_dp)
+    if (.not. through) return
+    foot(:) = from + before/(before - behind)*(to - from)
+    if (size(corner, 2) == 2) then
+      through = abs(dot_product(edge, foot - corner(:, 1))/dot_product(edge, edge) - 0.5_dp) <= 0.5_dp + seam
+      return
+    end if
+    do c = 1, 3
+      edge(:) = corner(:, mod(c, 3) + 1) - corner(:, c)
+      other(:) = foot - corner(:, c)
+      turned(:) = cross(edge, other)
+      through = dot_product(normal, turned) >= -seam*dot_product(normal, normal)
+      if (.not. through) return
+    end do
+  end function goes_through
 
   pure subroutine lengthen(list)
     integer, allocatable, intent(inout) :: list(:)

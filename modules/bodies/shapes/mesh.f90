@@ -42,6 +42,7 @@ module gravier_mesh
     procedure :: take_facets => mesh_take_facets
     procedure :: locate => mesh_locate
     procedure :: find_facets => mesh_find_facets
+    procedure :: parts => mesh_parts
     procedure :: find_box => mesh_find_box
     procedure :: find_middle => mesh_find_middle
     procedure :: half_width => mesh_half_width
@@ -229,6 +230,19 @@ contains
     end do
     if (distance > 0.0_dp) normal(:) = normal/distance
   end subroutine mesh_locate
+
+  !> Whether a facet lies between two points.
+  pure logical function mesh_parts(self, from, to) result(parts)
+    class(mesh_t), intent(in) :: self
+    !> from the point of the surface (3) [m]
+    real(dp), intent(in) :: from(3), to(3)
+    real(dp) :: axes(3, 3), place(3), other(3)
+
+    call self%find_axes(axes)
+    call turn_back(axes, from, place)
+    call turn_back(axes, to, other)
+    parts = self%data%tree%parts(self%data%corner, place, other)
+  end function mesh_parts
 
   !> Corners of the box of the facets, which turns with them.
   pure subroutine mesh_find_box(self, n, corner)

@@ -44,6 +44,9 @@ module gravier_neighbour_list
     !> where some body sleeps, the places of the pairs that are looked at, ascending: those with a grain that is awake (n_watched);
     !> not allocated where all are
     integer, allocatable :: watched(:)
+    !> where boundaries have facets, the bodies that may come to touch some, of other subdomains too (bodies searched); else not
+    !> allocated
+    logical, allocatable :: at_facets(:)
     !> numbers that pairs keep, 0 at first (memory%n_states, n)
     integer, allocatable :: state(:, :)
   contains
@@ -122,6 +125,7 @@ contains
     if (allocated(self%candidate)) deallocate (self%candidate, self%antagonist, self%shift)
     if (allocated(self%impulse)) deallocate (self%impulse, self%spring, self%state)
     if (allocated(self%watched)) deallocate (self%watched)
+    if (allocated(self%at_facets)) deallocate (self%at_facets)
     allocate (self%candidate(room), self%antagonist(room), self%shift(merge(room, 0, periodic)))
   end subroutine neighbour_list_init
 
@@ -218,6 +222,11 @@ contains
     end do
     self%n = n
     if (allocated(self%watched)) deallocate (self%watched)
+    if (.not. allocated(self%at_facets)) return
+    ! bodies move up, in their order
+    do i = 1, size(place)
+      if (place(i) > 0) self%at_facets(place(i)) = self%at_facets(i)
+    end do
   end subroutine neighbour_list_drop
 
   !> Pairs that are looked at.

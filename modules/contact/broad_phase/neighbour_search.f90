@@ -177,7 +177,8 @@ contains
     place(:) = place_of(self%position(:, e), self%lower, self%edge(level))
   end function entries_place
 
-  !> List the grains of the subdomain that are near a boundary.
+  !> List the grains of the subdomain that are near a boundary. Where there are facets, those of other subdomains are looked at,
+  !> too, since facets may lie between a grain and one of these.
   subroutine search_boundaries(self, bodies, extent, owned, list)
     type(neighbour_search_t), intent(in) :: self
     type(body_set_t), intent(in) :: bodies
@@ -187,20 +188,26 @@ contains
     integer :: k, b
     real(dp) :: distance, normal(bodies%nd), range(size(self%boundaries))
     type(near_facets_t) :: near
+    logical :: is_own
 
+    if (has_facets(self%boundaries)) allocate (list%at_facets(bodies%n), source=.false.)
     do b = 1, size(self%boundaries)
       range(b) = self%rule%alert_distance + self%rule%margin(norm2(self%boundaries(b)%velocity))
     end do
     do k = 1, bodies%n
-      if (owned(k) /= self%subdomain .or. bodies%glued(k) > 0) cycle
+      is_own = owned(k) == self%subdomain .and. bodies%glued(k) == 0
+      if (.not. (is_own .or. allocated(list%at_facets))) cycle
       do b = 1, size(self%boundaries)
         if (.not. self%boundaries(b)%touches()) cycle
         if (self%rule%filter%lets_pass(bodies, self%boundaries, k, -b)) cycle
         if (self%boundaries(b)%is_faceted()) then
           call self%boundaries(b)%find_facets(bodies%position(:, k), extent(k) + range(b), near)
-          if (near%n > 0) call list%add(k, -b, no_shift)
+          if (near%n == 0) cycle
+          list%at_facets(k) = .true.
+          if (is_own) call list%add(k, -b, no_shift)
           cycle
         end if
+        if (.not. is_own) cycle
         call self%boundaries(b)%locate(bodies%position(:, k), distance, normal)
         if (distance - extent(k) <= range(b)) call list%add(k, -b, no_shift)
       end do

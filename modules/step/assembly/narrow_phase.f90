@@ -102,7 +102,7 @@ contains
         gap = distance - view%bodies%radius(i) - view%bodies%radius(j)
         if (is_far(view%list, p, gap, alert)) cycle
         if (screens%exist) then
-          if (screens%part(decomposition, view%bodies, i, j, view%bodies%position(:, i), branch)) cycle
+          if (screens%part(decomposition, view, p, view%bodies%position(:, i), branch)) cycle
         end if
         if (distance > 0.0_dp) then
           found%normal(:, c) = branch/distance
@@ -208,7 +208,7 @@ contains
       branch(:) = (max(points%gap(k), 0.0_dp) + 2.0_dp*depth*min(view%bodies%radius(i), view%bodies%radius(j)))* &
         & points%normal(1:nd, k)
       place(:) = view%bodies%position(:, i) + points%point(1:nd, k) + 0.5_dp*branch
-      screened = screens%part(decomposition, view%bodies, i, j, place, branch)
+      screened = screens%part(decomposition, view, p, place, branch)
     end associate
   end function is_screened
 

@@ -1,16 +1,16 @@
-!> Walls without a thickness between grains: segments and rectangles. Grains on both sides of one do not touch each other through
-!> it, though the places where they touch it may be one. Meshes are none: to look for facets at each contact would take three times
-!> as long as all the rest of detection.
+!> Walls without a thickness between grains: segments, rectangles and meshes. Grains on both sides of one do not touch each other
+!> through it, though the places where they touch it may be one. Facets are looked at between bodies that both may come to touch some:
+!> to look for them at each contact would take three times as long as all the rest of detection.
 module gravier_screens
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
-  use gravier_body_store, only: body_set_t
   use gravier_decomposition, only: decomposition_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: screens_t
 
-  !> The segments and rectangles of a scene that are there.
+  !> The walls without a thickness of a scene that are there.
   type :: screens_t
     !> there are some
     logical :: exist = .false.
@@ -47,45 +47,63 @@ contains
   !> Whether a boundary is a wall without a thickness.
   pure logical function is_screen(boundary)
     type(boundary_t), intent(in) :: boundary
-    is_screen = boundary%present .and. boundary%has_corners()
-    if (is_screen) is_screen = boundary%touches()
+    is_screen = boundary%touches() .and. (boundary%has_corners() .or. boundary%is_faceted())
   end function is_screen
 
   !> Whether one of them, through which neither of two bodies passes, lies between a point of one and a point of the other.
-  pure logical function screens_part(self, decomposition, bodies, i, j, place, branch) result(part)
+  pure logical function screens_part(self, decomposition, view, pair, place, branch) result(part)
     class(screens_t), intent(in) :: self
     type(decomposition_t), intent(in) :: decomposition
-    type(body_set_t), intent(in) :: bodies
-    !> bodies
-    integer, intent(in) :: i, j
-    !> the point of i, and from the point of j to it (nd) [m]
+    type(local_bodies_t), intent(in) :: view
+    !> place of the two bodies in the list
+    integer, intent(in) :: pair
+    !> the point of the candidate, and from the point of the antagonist to it (nd) [m]
     real(dp), intent(in) :: place(:), branch(:)
+    logical :: at_facets
     integer :: k
 
     part = .false.
-    do k = 1, size(self%boundary)
-      associate (boundary => decomposition%boundaries(self%boundary(k)))
-        if (.not. is_between(boundary, place, branch)) cycle
-        associate (filter => decomposition%rule%filter, b => self%boundary(k))
-          part = .not. (filter%lets_pass(bodies, decomposition%boundaries, i, -b) .or. &
-            & filter%lets_pass(bodies, decomposition%boundaries, j, -b))
+    associate (list => view%list, filter => decomposition%rule%filter)
+      at_facets = allocated(list%at_facets)
+      if (at_facets) at_facets = list%at_facets(list%candidate(pair)) .and. list%at_facets(list%antagonist(pair))
+      do k = 1, size(self%boundary)
+        associate (boundary => decomposition%boundaries(self%boundary(k)), b => self%boundary(k))
+          if (boundary%is_faceted()) then
+            if (.not. at_facets) cycle
+          end if
+          if (.not. is_between(boundary, place, branch)) cycle
+          part = .not. (filter%lets_pass(view%bodies, decomposition%boundaries, list%candidate(pair), -b) .or. &
+            & filter%lets_pass(view%bodies, decomposition%boundaries, list%antagonist(pair), -b))
+          if (part) return
         end associate
-        if (part) return
-      end associate
-    end do
+      end do
+    end associate
   end function screens_part
 
-  !> Whether a segment or a rectangle lies between two points.
+  !> Whether a boundary lies between two points. A mesh that does not turn may be as wide as the period, so that its images are
+  !> looked at as well.
   pure logical function is_between(boundary, place, branch) result(parts)
     type(boundary_t), intent(in) :: boundary
     real(dp), intent(in) :: place(:), branch(:)
-    real(dp) :: from(3), to(3)
+    real(dp) :: image(3), from(3), to(3)
+    integer :: images(3), i, j, k
 
-    call boundary%find_image(place, from)
-    from(:) = from - boundary%surface%point
-    to(:) = from
-    to(1:size(branch)) = from(1:size(branch)) - branch
-    parts = boundary%surface%parts(from, to)
+    call boundary%find_image(place, image)
+    image(:) = image - boundary%surface%point
+    images(:) = merge(1, 0, boundary%period > 0.0_dp .and. boundary%is_faceted() .and. .not. boundary%drive%turns())
+    do k = -images(3), images(3)
+      do j = -images(2), images(2)
+        do i = -images(1), images(1)
+          from(1) = image(1) + i*boundary%period(1)
+          from(2) = image(2) + j*boundary%period(2)
+          from(3) = image(3) + k*boundary%period(3)
+          to(:) = from
+          to(1:size(branch)) = from(1:size(branch)) - branch
+          parts = boundary%surface%parts(from, to)
+          if (parts) return
+        end do
+      end do
+    end do
   end function is_between
 
 end module gravier_screens
