@@ -132,8 +132,8 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
     return figure
 
 
-def draw_history(runs, columns, against="time"):
-    """A figure with a panel for each column of history.csv against time or another column, a line a run."""
+def draw_history(runs, columns, against="time", rows=1):
+    """A figure with a panel for each column of history.csv against time or another column, a line a run; with `rows` of means of so many steps."""
     histories = [run.history() for run in runs]
     for run, history in zip(runs, histories):
         if len(history) == 0:
@@ -141,6 +141,8 @@ def draw_history(runs, columns, against="time"):
         for name in [*columns, against]:
             if name not in history:
                 raise PictureError(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
+    if rows > 1:
+        histories = [history.means(rows) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
     panels = [Panel(label_of_all(column, dimensions), [(history[against], history[column], name if k == 0 else None)
@@ -249,7 +251,7 @@ def draw_profile(run, name, steps, columns, mean):
     if not steps:
         raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
     name, axis = region_with_bins(run, name, steps[-1])
-    tables = [run.region(name, step) for step in steps]
+    tables = [run.region_mean(name, steps)] if mean else [run.region(name, step) for step in steps]
     bar = ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), TIMES)
     upright = axis == run.dimension - 1
     figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
@@ -257,35 +259,25 @@ def draw_profile(run, name, steps, columns, mean):
                                   sharex=not upright, sharey=upright)
     places = places.ravel()
     for axes, column in zip(places, columns):
-        draw_column(axes, run, tables, column, axis, None if mean or len(steps) == 1 else bar.to_rgba([run.time(step) for step in steps]))
+        draw_column(axes, run, tables, column, axis, None if len(tables) == 1 else bar.to_rgba([run.time(step) for step in steps]))
         grid(axes)
         legend_above(axes, columns=4)
     (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
     what = f"region {name}, step {steps[0]}" + (f" to {steps[-1]}: {'mean of ' if mean else ''}{len(steps)} states" if len(steps) > 1 else
                                                f", t = {run.time(steps[0]):.4g} s")
     if "samples" in tables[-1]:
-        what += f", {'each ' if len(steps) > 1 else ''}a mean of {tables[-1].samples[0]} steps"
+        what += f", {'each ' if len(steps) > 1 else ''}a mean of {tables[-1].samples[0]:.0f} steps"
     figure.suptitle(what, fontsize=9, x=0.01, ha="left")
-    if len(steps) > 1 and not mean:
+    if len(tables) > 1:
         figure.colorbar(bar, ax=list(places), label="time [s]", aspect=35)
     return figure
 
 
-def mean_of(rows):
-    """Means over those states in which a bin has a value."""
-    rows = numpy.array(rows)
-    count = numpy.isfinite(rows).sum(axis=0)
-    return numpy.where(count > 0, numpy.nansum(rows, axis=0) / numpy.maximum(count, 1), numpy.nan)
-
-
 def draw_column(axes, run, tables, column, axis, shades):
-    """Curves of a column: with `shades` a colour a state and a dash a component, else the mean over the states with a colour a component."""
+    """Curves of a column: with `shades` a colour a state and a dash a component, else those of one table with a colour a component."""
     upright = axis == run.dimension - 1
     rows = [components(table, column, run.dimension, axis) for table in tables]
     centres = [table.centre[:, axis] for table in tables]
-    if shades is None:
-        rows = [{key: mean_of([row[key] for row in rows]) for key in rows[0]}]
-        centres = [numpy.mean(centres, axis=0)]
     for k, (centre, row) in enumerate(zip(centres, rows)):
         for c, (key, values) in enumerate(row.items()):
             colour = LINES[c % len(LINES)] if shades is None else shades[k]

@@ -71,13 +71,14 @@ def parse(arguments):
     packing.add_argument("--dpi", type=int, default=200, metavar="N", help="of a PNG (200)")
     history = kinds.add_parser("history", parents=[several], help="columns of history.csv against time or another column")
     history.add_argument("--columns", default="iterations,residual,kinetic_energy", metavar="A,B", help="%(default)s unless told")
+    history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain")
     convergence = kinds.add_parser("convergence", parents=[several], help="residual and jump of a solve (&output trace = .true.)")
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")
     profile.add_argument("--region", metavar="NAME", help="a region with bins; the only one unless told")
     profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; the last one unless told")
-    profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step")
+    profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step; velocities are weighted by mass")
     profile.add_argument("--columns", default="solid_fraction,velocity,stress", metavar="A,B", help="%(default)s unless told")
     # numbers as -1e-3 are no options
     packing._negative_number_matcher = NEGATIVE
@@ -99,6 +100,8 @@ def check(options):
             refuse(f"--box {' '.join(f'{number:g}' for number in options.box)}: expected numbers")
         if options.view and not numpy.isfinite(options.view).all():
             refuse(f"--view {options.view[0]:g} {options.view[1]:g}: expected two numbers")
+    if options.kind == "history" and options.mean < 1:
+        refuse(f"--mean {options.mean}: expected 1 or more")
     if options.kind == "packing" and not 1 <= options.dpi <= 10000:
         refuse(f"--dpi {options.dpi}: expected 1 to 10000")
     if options.kind == "movie" or (options.kind == "packing" and (options.out is None or options.out.suffix != ".svg")):
@@ -128,7 +131,7 @@ def draw(options):
     elif options.kind == "movie":
         draw_movie(runs[0], options)
     elif options.kind == "history":
-        save(draw_history(runs, options.columns.split(","), options.against), out)
+        save(draw_history(runs, options.columns.split(","), options.against, options.mean), out)
     elif options.kind == "profile":
         save(draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean), out)
     else:

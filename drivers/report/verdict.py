@@ -89,11 +89,11 @@ def accurate(log, history, solver):
 def projected(log, history):
     """How often overlaps were projected, and how deep the deepest of the run was."""
     answer = how_often_projected(log, history)
-    depth = re.search(r"later at most \S+ m, (\S+) of ", log.value("overlaps"))
+    depth = re.search(r"later at most \S+ m, (\S+) of ([a-z ]+)", log.value("overlaps"))
     if depth and answer.grade != BAD and float(depth[1]) > SHALLOW:
         deep = float(depth[1]) > DEEP
         return Answer(answer.question, BAD if deep else max(answer.grade, DOUBT, key=[GOOD, DOUBT, BAD, UNKNOWN].index),
-                      f"{answer.text} It is {'deep' if deep else 'more than is usual'}: {depth[1]} of the mean radius.")
+                      f"{answer.text} It is {'deep' if deep else 'more than is usual'}: {depth[1]} of {depth[2]}.")
     return answer
 
 

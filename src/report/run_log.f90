@@ -22,6 +22,7 @@ module gravier_run_log
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
   use gravier_late_events, only: late_warnings
+  use gravier_rounding_lines, only: rounding_warnings
   use gravier_intact_bonds, only: count_bonds
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
@@ -271,6 +272,9 @@ contains
     warnings = warnings + number
     text = text//more
     call late_warnings(simulation, more, number)
+    warnings = warnings + number
+    text = text//more
+    call rounding_warnings(simulation, more, number)
     warnings = warnings + number
     call write_lines(self, text//more, "", error)
   end subroutine run_log_write_scales

@@ -90,8 +90,7 @@ contains
         text = "&solver fallback = 'newton' takes over solves that stagnate"
       else if (tally%stagnated < max(tally%exhausted, tally%unbounded, tally%diverged)) then
         text = "a smaller &time step"
-        if (tally%unbounded >= max(tally%exhausted, tally%diverged)) text = text// &
-          & ", or more room: bodies that cannot part are pressed together"
+        if (tally%unbounded > 0) text = text//", or more room: bodies that cannot part are pressed together"
         if (tally%exhausted > max(tally%unbounded, tally%diverged)) text = "a larger &solver max_iterations, now "// &
           & to_text(solver%max_iterations)//", or "//text
       else if (tally%stagnated > fallback%taken - fallback%solved + fallback%passed_over .and. allocated(fallback%method)) then
@@ -180,6 +179,9 @@ contains
         text = "*** "//to_text(simulation%failed)//" of the steps did NOT reach the "
         if (misses_residual_only(simulation)) then
           text = text//"tolerance of the residual: their velocities are within the accuracy, their impulses may not be"
+        else if (knows_misses(simulation)) then
+          text = text//goal_name(simulation)//": by the estimates of their errors velocities were wrong by up to "// &
+            & plain(tally%worst_error)//" times the velocity scale U"
         else
           text = text//goal_name(simulation)//": the accuracy of the results is not known"
         end if
@@ -198,7 +200,8 @@ contains
         text = text//" reached the "//goal_name(simulation)
         if (goal_name(simulation) /= "accuracy") text = text//" and the accuracy"
       end if
-      if (tally%worst_error > far_off .and. .not. (simulation%failed == 0 .and. is_doubtful(simulation))) text = text// &
+      if (tally%worst_error > far_off .and. .not. (simulation%failed == 0 .and. is_doubtful(simulation)) .and. &
+        & .not. knows_misses(simulation)) text = text// &
         & trim(merge(", but", ";    ", simulation%failed == 0))//" velocities were wrong by up to "//plain(tally%worst_error)// &
         & " times the velocity scale U in "//to_text(tally%far_off)//" of "//steps
       if (tally%mended_share() > often_mended) then
@@ -219,6 +222,17 @@ contains
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text
+
+  !> Whether solves missed the accuracy alone, and by no more than half of U: larger estimates tell no size.
+  pure logical function knows_misses(simulation) result(knows)
+    type(simulation_t), intent(in) :: simulation
+
+    associate (tally => simulation%tally)
+      knows = simulation%failed > 0 .and. simulation%config%solver%criterion == "velocity_error" .and. &
+        & simulation%failed == tally%missed() .and. tally%unbounded + tally%diverged == 0 .and. &
+        & tally%worst_error > simulation%config%solver%accuracy .and. tally%worst_error <= far_off
+    end associate
+  end function knows_misses
 
   !> Whether a looser goal or a longer step may be advised: not where results are too loose already.
   logical function may_loosen(simulation) result(may)

@@ -100,6 +100,12 @@ class Package(RunTestCase):
             self.assertTrue(np.array_equal(run.contacts().impulse, file["steps/300/contacts/impulse"]))
             self.assertEqual(list(run.boundaries().shape), [value.decode() for value in file["boundaries/shape"]])
         self.assertEqual(len(run.history()), 300)
+        means, every = run.history().means(70), run.history().kinetic_energy
+        self.assertEqual(len(means), 4)
+        np.testing.assert_allclose(means.kinetic_energy, [every[70 * k:70 * (k + 1)].mean() for k in range(4)], rtol=1e-15)
+        with self.assertRaisesRegex(gravier.ResultsError, "means of 301 rows; expected 1 to 300, the rows that there are"):
+            run.history().means(301)
+        self.assertEqual(run.verdict(), "converged")
         self.assertEqual(set(run.trace().step), set(range(1, 301)))
         self.assertEqual(run.case["solver"], [self.base["solver"]])
         with self.assertRaisesRegex(gravier.ResultsError, "no step 7; expected one of 0, 100, 200, 300"):

@@ -210,6 +210,22 @@ class Scales(RunTestCase):
                                  "warning     &boundary 'gate': remove_at = 4.00000E-01 s, and the run ends at 4.00000E-01 s, before it is removed"])
         self.assertEqual(self.warnings(self.check_case(case, {"time": {"steps": 501}})), [])
 
+    def test_far_from_the_origin(self):
+        """Places of maps, of which the last digits are coarser than a step at the speed of the scene: a floor that rises came 7 % too short."""
+        bodies = "id,x,y,radius\n1,5e5,5000000.02,0.01\n"
+        os.makedirs(self.here("check"), exist_ok=True)
+        write(os.path.join(self.here("check"), "far.csv"), bodies)
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "far.csv", "gravity": [0.0, 0.0]}, "time": {"step": 1e-4, "steps": 10},
+                "boundary": [{"name": "floor", "shape": "plane", "point": [5e5, 5e6], "normal": [0.0, 1.0], "velocity": [0.0, 1e-4]}]}
+        lines = self.warnings(self.check_case(case))
+        self.assertEqual(lines, ["warning     &boundary 'floor' at 5.00E+06 m: numbers there are 9.3E-10 m apart, and a step at 1.00E-04 m/s is 1.00E-08 m: "
+                                 "rounding changes such motion by up to 9.31 %; put the origin nearer to the scene"])
+        still = {"boundary": [{**case["boundary"][0], "velocity": [0.0, 0.0]}], "scene": {"gravity": [0.0, -10.0]}, "time": {"step": 1e-5}}
+        lines = self.warnings(self.check_case(case, still))
+        self.assertEqual(lines, ["warning     bodies at 5.00E+06 m: numbers there are 9.3E-10 m apart, and a step at 1.00E-04 m/s is 1.00E-09 m: "
+                                 "rounding changes such motion by up to 93.13 %; put the origin nearer to the scene"])
+        self.assertEqual(self.warnings(self.check_case(case, {"time": {"step": 1e-2}})), [])
+
     def test_slip_scale(self):
         """Errors of a tenth of g h are as large as the slip at which static friction is lost: ten layers that are shaken below their limit slide."""
         law = {"material": {"name": "a"}, "scene": {"wall_material": "a"}}

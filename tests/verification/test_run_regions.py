@@ -200,6 +200,27 @@ class Regions(RunTestCase):
             self.assertAlmostEqual((found.volume * found.solid_fraction).sum() / volume, 1.0, delta=1e-13)
             self.assertEqual(found.grains.sum(), count)
 
+    def test_means_over_states(self):
+        """Two disks cross ten bins one after the other: means over states have the mass and the momentum of all, and bins that are always empty have no
+        velocity. The mean of the velocities of single states would count a corner of a disk as much as the whole of it."""
+        path = grains(self.here("passing.csv"), [[0.03, 0.0], [0.11, 0.05]], [[4.0, 0.0], [-1.0, 0.0]])
+        case = merged(free(path), {"time": {"step": 1e-3, "steps": 20}, "output": {"every": 2}})
+        case["region"] = [{"name": "way", "axis": "x", "bins": 10, "lower": [0.0, -0.02], "upper": [0.2, 0.07]}]
+        run = package.Run(os.path.join(self.play("passing", case).directory, "results"))
+        steps = [step for step in run.steps if step > 0]
+        found = run.region_mean("way")
+        rows = [run.region("way", step) for step in steps]
+        momentum = np.mean([(each.solid_fraction * each.volume)[:, None] * each.velocity for each in rows], axis=0)
+        there = found.solid_fraction > 0.0
+        self.assertTrue(2 < there.sum() < 10)
+        np.testing.assert_allclose((found.solid_fraction * found.volume)[there, None] * found.velocity[there], momentum[there], rtol=1e-12)
+        self.assertTrue(np.isnan(found.velocity[~there]).all())
+        np.testing.assert_allclose(found.velocity[1], [4.0, 0.0], rtol=1e-12)
+        np.testing.assert_array_equal(run.region_mean("way", [20]).velocity[there & (rows[-1].solid_fraction > 0)],
+                                      rows[-1].velocity[there & (rows[-1].solid_fraction > 0)])
+        with self.assertRaisesRegex(package.ResultsError, "no step with means over regions"):
+            run.region_mean("way", [])
+
     # ---- where it is computed
 
     def stirred(self, dimension):

@@ -1,4 +1,5 @@
 """What a run left in its directory, as numpy arrays."""
+import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -271,8 +272,38 @@ class Run:
         rows["pressure"] = np.trace(rows.stress, axis1=1, axis2=2) / self.dimension
         return rows
 
+    def region_mean(self, name, steps=None):
+        """The means over written steps, all after the start unless told, of a region, a row a bin with the columns of `region`. Velocities and
+        granular temperatures are weighted by the mass in the bin, contacts_per_grain by the grains; they are NaN where there are never any."""
+        steps = [step for step in self.steps if step > 0] if steps is None else list(steps)
+        if not steps:
+            raise ResultsError(f"{self.path}: no step with means over regions; expected one after the start")
+        tables = [self.region(name, step) for step in steps]
+        weights = {"velocity": [rows.solid_fraction * rows.volume for rows in tables], "contacts_per_grain": [rows.grains for rows in tables]}
+        weights["granular_temperature"] = weights["velocity"]
+        found = Table()
+        for key in tables[0]:
+            values = np.array([rows[key] for rows in tables], dtype=float)
+            weight = np.array(weights.get(key, np.ones(values.shape[:2])), dtype=float).reshape(values.shape[:2] + (1,) * (values.ndim - 2))
+            total = weight.sum(axis=0)
+            found[key] = np.where(total > 0.0, (weight * np.where(weight > 0.0, values, 0.0)).sum(axis=0) / np.where(total > 0.0, total, 1.0), np.nan)
+        return found
+
+    def verdict(self):
+        """The last words of run.log: 'converged', 'not converged', 'converged only by' another criterion than the velocity error, or 'not finished'."""
+        try:
+            text = (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
+        except OSError as reason:
+            raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
+        # that of the last start
+        lines = re.split(r"^Gravier \S+ \(", text, flags=re.M)[-1].splitlines()
+        said = next((line.split(None, 1)[1] for line in reversed(lines) if line.startswith("converged ")), "")
+        if not said or not any(line.startswith("finished ") for line in lines):
+            return "not finished"
+        return {"yes": "converged", "NO": "not converged"}.get(said.split(":")[0], "converged only by")
+
     def history(self):
-        """history.csv: a row a step."""
+        """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""
         return read_table(self.directory / "history.csv", ("step", "time"))
 
     def trace(self):

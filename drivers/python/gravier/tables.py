@@ -24,6 +24,13 @@ class Table(dict):
     def __len__(self):
         return len(next(iter(self.values()))) if self.keys() else 0
 
+    def means(self, rows):
+        """The means of so many rows after each other, as a table; rows behind the last whole block are left out."""
+        if rows < 1 or rows > len(self):
+            raise ResultsError(f"means of {rows} rows; expected 1 to {len(self)}, the rows that there are")
+        blocks = len(self) // rows
+        return Table({name: values[:blocks * rows].reshape(blocks, rows, *values.shape[1:]).mean(axis=1) for name, values in self.items()})
+
     def frame(self):
         """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner or edge 1 NAME_1y. Impulses
         and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""

@@ -19,6 +19,7 @@ program test_run_summary
   call test_output()
   call test_newton()
   call test_refuted()
+  call test_misses()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -72,6 +73,33 @@ contains
     call check(index(mending_text(simulation), "a smaller &solver accuracy") == 0, "not where solves missed it")
     call simulation%free()
   end subroutine test_refuted
+
+  !> Solves that missed the accuracy by little have estimates of their errors, which the last words give; those without a solution,
+  !> and those far from it, have none.
+  subroutine test_misses()
+    type(simulation_t) :: simulation
+    character(len=*), parameter :: begin = " of the steps did NOT reach the accuracy: "
+    character(len=:), allocatable :: expected
+    integer :: round
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 2 /", simulation)
+    simulation%step = 2
+    simulation%tally%steps = 2
+    do round = 1, 4
+      simulation%failed = merge(2, 1, round == 4)
+      simulation%tally%stagnated = merge(0, 1, round == 2)
+      simulation%tally%unbounded = merge(1, 0, round == 2)
+      simulation%tally%worst_error = merge(0.6_dp, 0.176_dp, round == 3)
+      expected = "*** "//merge("2", "1", round == 4)//begin
+      if (round == 1) then
+        expected = expected//"by the estimates of their errors velocities were wrong by up to 0.18 times the velocity scale U"
+      else
+        expected = expected//"the accuracy of the results is not known"
+      end if
+      call check(index(verdict_text(simulation), expected) == 1, "the last words")
+    end do
+    call simulation%free()
+  end subroutine test_misses
 
   !> Whether the advice has some words where these phases together take nine tenths of the time.
   logical function says(simulation, dear, words)

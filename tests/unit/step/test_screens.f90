@@ -95,9 +95,10 @@ contains
   !> Bodies that stay when others leave take along whether they are near facets.
   subroutine test_departure()
     type(neighbour_list_t) :: list
+    integer :: none(0)
 
     call list%init(.false., 1)
-    call list%finish([integer ::], pair_memory_t())
+    call list%finish(none, pair_memory_t())
     allocate (list%at_facets(3))
     list%at_facets(1) = .true.
     list%at_facets(2) = .false.
