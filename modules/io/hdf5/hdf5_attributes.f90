@@ -13,7 +13,7 @@ module gravier_hdf5_attributes
   use gravier_hdf5_tree, only: h5_tree_t
   implicit none
   private
-  public :: h5_attributes_t
+  public :: h5_attributes_t, attach_integer
 
   type, extends(h5_tree_t) :: h5_attributes_t
   contains
@@ -146,35 +146,59 @@ contains
     call self%comm%agree(error)
   end subroutine h5_change_attribute
 
+  !> Attach an integer to an object that is open.
+  subroutine attach_integer(object, name, value, stat)
+    integer(hid_t), intent(in) :: object
+    character(len=*), intent(in) :: name
+    integer(i8), intent(in) :: value
+    !> below 0 after a failure
+    integer, intent(out) :: stat
+    integer(i8), target :: copy
+
+    copy = value
+    call attach(object, name, value_t(H5T_STD_I64LE, h5kind_to_type(i8, H5_INTEGER_KIND), 0, c_loc(copy)), stat)
+  end subroutine attach_integer
+
+  subroutine attach(object, name, value, stat)
+    integer(hid_t), intent(in) :: object
+    character(len=*), intent(in) :: name
+    type(value_t), intent(in) :: value
+    integer, intent(out) :: stat
+    integer(hid_t) :: space, attribute
+    integer(hsize_t) :: extent(1)
+    type(c_ptr) :: address
+    integer :: ignored
+
+    address = value%buffer
+    if (value%length == 0) then
+      call h5screate_f(H5S_SCALAR_F, space, ignored)
+    else
+      extent = int(value%length, hsize_t)
+      call h5screate_simple_f(1, extent, space, ignored)
+    end if
+    call h5acreate_f(object, name, value%file_type, space, attribute, stat)
+    if (stat == 0) then
+      call h5awrite_f(attribute, value%memory_type, address, stat)
+      call h5aclose_f(attribute, ignored)
+    end if
+    call h5sclose_f(space, ignored)
+  end subroutine attach
+
   !> Write one attribute.
   subroutine write_value(self, path, name, value, error)
     class(h5_attributes_t), intent(in) :: self
     character(len=*), intent(in) :: path, name
     type(value_t), intent(in) :: value
     type(error_t), allocatable, intent(inout) :: error
-    integer(hid_t) :: place, object, space, attribute
-    integer(hsize_t) :: extent(1)
+    integer(hid_t) :: place, object
     character(len=:), allocatable :: object_name
-    type(c_ptr) :: address
     integer :: stat, ignored
 
     if (allocated(error)) return
-    address = value%buffer
     call self%locate(path, place, object_name)
     call h5oopen_f(place, object_name, object, stat)
     if (stat == 0) then
-      if (value%length == 0) then
-        call h5screate_f(H5S_SCALAR_F, space, ignored)
-      else
-        extent = int(value%length, hsize_t)
-        call h5screate_simple_f(1, extent, space, ignored)
-      end if
-      call h5acreate_f(object, name, value%file_type, space, attribute, stat)
-      if (stat == 0) then
-        call h5awrite_f(attribute, value%memory_type, address, stat)
-        call h5aclose_f(attribute, ignored)
-      end if
-      call h5sclose_f(space, ignored)
+      call attach(object, name, value, stat)
       call h5oclose_f(object, ignored)
     end if
     if (stat < 0) call self%fail(path, "cannot write attribute "//name, error)

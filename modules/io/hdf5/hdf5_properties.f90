@@ -56,6 +56,9 @@ module gravier_hdf5_properties
     end function c_set_cache_config
   end interface
 
+  !> bytes of headers that HDF5 keeps in memory: each flush looks at all of them, those of earlier states too
+  integer(c_size_t), parameter :: cache_size = 262144_c_size_t
+
   !> HDF5 runs
   logical :: library_started = .false.
   !> length of their names that this room is counted for
@@ -88,6 +91,10 @@ contains
     ! some of a change written and some not
     if (c_get_cache_config(access, config) == 0) then
       config%write_strategy = 0
+      config%set_initial_size = .true._c_bool
+      config%initial_size = cache_size
+      config%min_size = cache_size
+      config%max_size = cache_size
       stat = c_set_cache_config(access, config)
     end if
     ! HDF5 1.10 takes integer handles

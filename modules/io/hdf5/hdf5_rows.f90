@@ -9,7 +9,7 @@ module gravier_hdf5_rows
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_rows
   use gravier_hdf5_properties, only: text_type, is_ascii
-  use gravier_hdf5_attributes, only: h5_attributes_t
+  use gravier_hdf5_attributes, only: h5_attributes_t, attach_integer
   use gravier_hdf5_datasets, only: rows_t, rows_of, create_dataset, transfer_rows, get_extent, class_of, type_of, &
     & is_fixed_text, columns_text
   implicit none
@@ -199,7 +199,7 @@ contains
     type(rows_t), intent(in) :: rows
     type(error_t), allocatable, intent(inout) :: error
     integer(hid_t) :: dataset
-    integer(i8) :: first, total
+    integer(i8) :: first, total, digest
     integer :: stat, ignored
 
     if (allocated(error)) return
@@ -217,9 +217,14 @@ contains
       call transfer_rows(dataset, rows, first, .true., stat)
       if (stat < 0) call self%fail(path, "cannot write this dataset: is the disk full?", error)
     end if
+    call self%comm%agree(error)
+    if (.not. allocated(error)) then
+      digest = self%comm%exclusive_or(checksum_of(rows, first))
+      call attach_integer(dataset, checksum, digest, stat)
+      if (stat < 0) call self%fail(path, "cannot write attribute "//checksum, error)
+    end if
     call h5dclose_f(dataset, ignored)
     call self%comm%agree(error)
-    call self%write_attribute(path, checksum, self%comm%exclusive_or(checksum_of(rows, first)), error)
   end subroutine write_block
 
   !> Of the rows of this rank, from row `first` of the table on.
