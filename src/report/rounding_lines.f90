@@ -14,9 +14,9 @@ module gravier_rounding_lines
 
 contains
 
-  !> Warnings, each a line ended by a newline, and their number. A body moves in two halves of a step, of which each is rounded to the
-  !> spacing of numbers at its place: that is wrong by up to this spacing over the way of the step, with one sign where the velocity
-  !> stays. The velocities looked at are that of the velocity scale, and those of boundaries as they move now. Collective.
+  !> Warnings, each a line ended by a newline, and their number. A body moves in two halves of a step, of which each is rounded to
+  !> the spacing of numbers at its place: that is wrong by up to this spacing over the way of the step, with one sign where the
+  !> velocity stays. The velocities looked at are that of the velocity scale, and those of boundaries as they move now. Collective.
   subroutine rounding_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text

@@ -1,6 +1,6 @@
 !> Walls without a thickness between grains: segments, rectangles and meshes. Grains on both sides of one do not touch each other
-!> through it, though the places where they touch it may be one. Facets are looked at between bodies that both may come to touch some:
-!> to look for them at each contact would take three times as long as all the rest of detection.
+!> through it, though the places where they touch it may be one. Facets are looked at between two bodies that both may come to touch
+!> some: to look for them at each contact would take three times as long as all the rest of detection.
 module gravier_screens
   use gravier_kinds, only: dp
   use gravier_boundary, only: boundary_t
