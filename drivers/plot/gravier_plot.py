@@ -78,7 +78,7 @@ def parse(arguments):
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")
     profile.add_argument("--region", metavar="NAME", help="a region with bins; the only one unless told")
     profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; the last one unless told")
-    profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step; velocities are weighted by mass")
+    profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step; velocities are weighted by the volume of grains")
     profile.add_argument("--columns", default="solid_fraction,velocity,stress", metavar="A,B", help="%(default)s unless told")
     # numbers as -1e-3 are no options
     packing._negative_number_matcher = NEGATIVE

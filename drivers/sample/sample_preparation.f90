@@ -3,7 +3,7 @@ module gravier_sample_preparation
   use mpi_f08, only: MPI_Wtime
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, status_ok, status_unconverged
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, counted
   use gravier_communicator, only: communicator_t
   use gravier_body_store, only: body_set_t
   use gravier_solve_report, only: solve_converged, solve_diverged
@@ -216,6 +216,7 @@ contains
       & fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii"// &
       & trim(merge(" of rigid contacts", "                  ", simulation%physics%laws%yields))//", "// &
       & to_text(simulation%step)//" steps", error)
+    if (simulation%left > 0) call log%line("warning     *** "//counted(simulation%left, "grain")//" left through outlets", error)
     call write_size(simulation, log, error)
     if (simulation%config%sample%preparation == "compacted") then
       do b = 1, simulation%n_walls

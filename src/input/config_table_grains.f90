@@ -17,8 +17,8 @@ module gravier_config_table_grains
      key_t("sample", "preparation", kind_choice, "'none'", "none settled compacted", &
            "what `gravier_sample` does with the grains: nothing, let gravity settle them, or compact them"), &
      key_t("sample", "container", kind_choice, "'box'", "box boundaries", &
-           "what holds the grains: planes on the sides of the box, or the boundaries of the case. Grains are placed clear "// &
-           "of all boundaries"), &
+           "what holds the grains: planes on the sides of the box, or the boundaries of the case. Loose grains are placed "// &
+           "clear of all boundaries"), &
      key_t("sample", "inner_point", kind_real, "3*0", "", &
            "a point inside the boundaries; grains are placed only where a straight line from there meets no boundary; its "// &
            "third component is 0 in 2D", &

@@ -8,6 +8,8 @@ module gravier_late_events
   public :: late_warnings
 
   character(len=*), parameter :: newline = new_line("a")
+  !> part of a step that roundings of times take
+  real(dp), parameter :: rounded = 1.0e-6_dp
 
 contains
 
@@ -31,8 +33,9 @@ contains
     end do
     do i = 1, size(simulation%decomposition%boundaries)
       associate (boundary => simulation%decomposition%boundaries(i))
-        if (boundary%remove_at >= end .and. boundary%remove_at < huge(end) .and. end > simulation%time) &
-          & call warn("&boundary", boundary%name, "remove_at", boundary%remove_at, "it is removed")
+        ! it goes with the first step that begins then
+        if (boundary%remove_at > end - (1.0_dp - rounded)*simulation%physics%h .and. boundary%remove_at < huge(end) .and. &
+          & end > simulation%time) call warn("&boundary", boundary%name, "remove_at", boundary%remove_at, "it is removed")
       end associate
     end do
 

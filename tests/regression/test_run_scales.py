@@ -209,6 +209,10 @@ class Scales(RunTestCase):
         self.assertEqual(lines, ["warning     &insertion 'late': start = 5.00000E-01 s, and the run ends at 4.00000E-01 s, before grains enter",
                                  "warning     &boundary 'gate': remove_at = 4.00000E-01 s, and the run ends at 4.00000E-01 s, before it is removed"])
         self.assertEqual(self.warnings(self.check_case(case, {"time": {"steps": 501}})), [])
+        # boundaries go with a step that begins at their time or later: 0.3995 lies in the last step, and 0.399 is its beginning
+        for time, number in ((0.3995, 2), (0.399, 1)):
+            gate = {"boundary": [{**case["boundary"][0], "remove_at": time}]}
+            self.assertEqual(len(self.warnings(self.check_case(case, gate))), number)
 
     def test_far_from_the_origin(self):
         """Places of maps, of which the last digits are coarser than a step at the speed of the scene: a floor that rises came 7 % too short."""
@@ -220,6 +224,13 @@ class Scales(RunTestCase):
         lines = self.warnings(self.check_case(case))
         self.assertEqual(lines, ["warning     &boundary 'floor' at 5.00E+06 m: numbers there are 9.3E-10 m apart, and a step at 1.00E-04 m/s is 1.00E-08 m: "
                                  "rounding changes such motion by up to 9.31 %; put the origin nearer to the scene"])
+        # far along itself, and at a turning point of an oscillation, which is at rest but for rounding
+        along = {"name": "floor", "shape": "plane", "point": [1e7, 0.0], "normal": [0.0, 1.0], "velocity": [0.0, 1e-4]}
+        turning = {"name": "shaker", "shape": "plane", "point": [0.01, -0.01], "normal": [0.0, 1.0], "oscillation": [0.0, 1e-5], "frequency": 5.0,
+                   "phase": math.pi / 2}
+        write(os.path.join(self.here("check"), "near.csv"), "id,x,y,radius\n1,0,0.02,0.01\n")
+        near = {"scene": {"bodies_file": "near.csv"}, "boundary": [along, turning]}
+        self.assertNotIn("rounding changes", self.check_case(case, near))
         still = {"boundary": [{**case["boundary"][0], "velocity": [0.0, 0.0]}], "scene": {"gravity": [0.0, -10.0]}, "time": {"step": 1e-5}}
         lines = self.warnings(self.check_case(case, still))
         self.assertEqual(lines, ["warning     bodies at 5.00E+06 m: numbers there are 9.3E-10 m apart, and a step at 1.00E-04 m/s is 1.00E-09 m: "

@@ -104,6 +104,20 @@ class Containers(RunTestCase):
             side = (0.3 - found.position[:, 0]) * (1.0 if left else -1.0)
             self.assertGreater((side - found.radius).min(), 0.0)
 
+    def test_mesh_as_wide_as_the_period(self):
+        """A fin of a mesh that stands beside the end of a period keeps grains away on the other side of it, too; a tube across the end is filled as a whole."""
+        case = merged(BASE, {"scene": {"period": [0.4, 0.0]}, "sample": {"container": "box", "box": [0.4, 0.5], "count": 120},
+                             "boundary": [{"name": "bed", "shape": "mesh", "file": "bed.csv"}]})
+        run = make(case, self.here("fin"), files={"bed.csv": "x,y\n0,0.01\n0.001,0.4\n0.002,0.01\n0.4,0.01\n"})
+        self.assert_status(run, 0)
+        found = Bodies(run.path("sample.h5"))
+        beside = found.position[:, 1] < 0.4
+        self.assertGreater(np.minimum(np.abs(found.position[beside, 0] - 0.002), np.abs(found.position[beside, 0] - 0.4)).min(), 0.008)
+        tube = merged(BASE, {"scene": {"dimension": 3, "period": [0.4, 0.0, 0.0], "period_origin": [0.0, -0.1, -0.1]}, "sample": {
+            "box": [0.4, 0.2, 0.2], "count": 200}, "boundary": [{"name": "tube", "shape": "cylinder", "radius": 0.1, "axis": [1.0, 0.0, 0.0]}]})
+        found = self.bodies(make(tube, self.here("periodic tube")))
+        self.assertLess((np.linalg.norm(found.position[:, 1:], axis=1) + found.radius).max(), 0.1)
+
     def test_obstacles(self):
         """Grains in a box keep clear of a plate that stands in it, on both sides."""
         case = merged(PARTED, {"sample": {"container": "box"}, "boundary": [{**PARTED["boundary"][0], "point": [0.3, 0.1], "end": [0.3, 0.3]}]})
@@ -129,7 +143,7 @@ class Containers(RunTestCase):
             "point at the drum": ({"sample": {"inner_point": [0.195, 0.0]}}, "where the largest grain with a radius of 1.20E-02 m has room, but it lies "
                                                                            "5.00E-03 m from the nearest boundary"),
             "point outside": ({"sample": {"inner_point": [0.3, 0.0]}}, "but it lies 1.00E-01 m behind the nearest boundary"),
-            "too many": ({"sample": {"count": 300}}, "&sample box: too many grains for the space that the boundaries leave them in the box: of 300 grains, "),
+            "too many": ({"sample": {"count": 300}}, "&sample box: too many grains for the space inside the boundaries, or a box that has little of this space: of 300 grains, "),
         }
         for name, (change, text) in refused.items():
             with self.subTest(name):

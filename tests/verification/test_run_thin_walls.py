@@ -47,6 +47,21 @@ class ThinWalls(RunTestCase):
             with self.subTest(title):
                 np.testing.assert_allclose(self.pull(title, dimension, grains, wall, **scene)[5:], force, rtol=1e-3, atol=1e-9)
 
+    def test_thin_bodies_on_a_wall(self):
+        """A brick on a thin plate on the ground, whatever the ground is: the wall below both is between none of their surfaces."""
+        write(self.here("flat.shapes"), "shape brick\npolygon -0.01 -0.005 0.01 -0.005 0.01 0.005 -0.01 0.005\n"
+                                        "shape plate\npolygon -0.01 -0.0002 0.01 -0.0002 0.01 0.0002 -0.01 0.0002\n")
+        write(self.here("pile.csv"), "id,x,y,shape\n1,0,0.0002,plate\n2,0,0.0054,brick\n")
+        write(self.here("ground.csv"), "x,y\n-0.1,0\n0.1,0\n")
+        for name, ground in (("plane", {"shape": "plane", "normal": [0.0, 1.0]}), ("segment", {"shape": "segment", "point": [-0.1, 0.0], "end": [0.1, 0.0]}),
+                             ("mesh", {"shape": "mesh", "file": "../ground.csv"})):
+            with self.subTest(name):
+                case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../pile.csv", "shapes": "../flat.shapes", "friction": 0.5},
+                        "boundary": [ground], "time": {"step": 1e-3, "steps": 200}, "output": {"directory": "results", "every": 200}}
+                run = run_case(case, directory=self.here("pile " + name))
+                self.assert_status(run, 0)
+                self.assertAlmostEqual(run.results("results")["/steps/200/bodies/position"][1, 1], 0.0054, delta=2e-5)
+
     def test_meshes_between_subdomains(self):
         """A mesh that parts a packing is between grains of other subdomains, too: no pair of grains across it has a contact."""
         write(self.here("bed.csv"), "id,x,y,radius\n" + "".join(

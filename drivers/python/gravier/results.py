@@ -274,7 +274,7 @@ class Run:
 
     def region_mean(self, name, steps=None):
         """The means over written steps, all after the start unless told, of a region, a row a bin with the columns of `region`. Velocities and
-        granular temperatures are weighted by the mass in the bin, contacts_per_grain by the grains; they are NaN where there are never any."""
+        granular temperatures are weighted by the volume of the grains in the bin, contacts_per_grain by their number, else NaN."""
         steps = [step for step in self.steps if step > 0] if steps is None else list(steps)
         if not steps:
             raise ResultsError(f"{self.path}: no step with means over regions; expected one after the start")
@@ -298,9 +298,10 @@ class Run:
         # that of the last start
         lines = re.split(r"^Gravier \S+ \(", text, flags=re.M)[-1].splitlines()
         said = next((line.split(None, 1)[1] for line in reversed(lines) if line.startswith("converged ")), "")
-        if not said or not any(line.startswith("finished ") for line in lines):
+        if not any(line.startswith("finished ") for line in lines):
             return "not finished"
-        return {"yes": "converged", "NO": "not converged"}.get(said.split(":")[0], "converged only by")
+        # without a step there is nothing to say
+        return {"yes": "converged", "NO": "not converged", "": "converged"}.get(said.split(":")[0], "converged only by")
 
     def history(self):
         """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""

@@ -52,6 +52,7 @@ module gravier_boundary
     procedure :: is_glued => boundary_is_glued
     procedure :: is_faceted => boundary_is_faceted
     procedure :: find_facets => boundary_find_facets
+    procedure :: lies_between => boundary_lies_between
     procedure :: find_place => boundary_find_place
     procedure :: is_driven => boundary_is_driven
     procedure :: is_moved => boundary_is_moved
@@ -227,6 +228,34 @@ contains
     if (seen > 1) call near%number_images()
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
+
+  !> Whether its surface, which has no thickness, lies between two points: the line from one to the other goes through it. A mesh that
+  !> does not turn may be as wide as the period, so that its images are looked at as well.
+  pure logical function boundary_lies_between(self, place, branch) result(between)
+    class(boundary_t), intent(in) :: self
+    !> a point, and the way to it from the other one (nd) [m]
+    real(dp), intent(in) :: place(:), branch(:)
+    real(dp) :: image(3), from(3), to(3)
+    integer :: images(3), i, j, k
+
+    call find_image(self, place, image)
+    image(:) = image - self%surface%point
+    images(:) = merge(1, 0, self%period > 0.0_dp .and. self%surface%is%faceted .and. .not. self%drive%turns())
+    between = .false.
+    do k = -images(3), images(3)
+      do j = -images(2), images(2)
+        do i = -images(1), images(1)
+          from(1) = image(1) + i*self%period(1)
+          from(2) = image(2) + j*self%period(2)
+          from(3) = image(3) + k*self%period(3)
+          to(:) = from
+          to(1:size(branch)) = from(1:size(branch)) - branch
+          between = self%surface%parts(from, to)
+          if (between) return
+        end do
+      end do
+    end do
+  end function boundary_lies_between
 
   !> Whether its surface is a segment or a rectangle.
   pure logical function boundary_has_corners(self)

@@ -30,7 +30,7 @@ contains
     room = .true.
     if (.not. allocated(self%boundaries)) return
     room = is_clear(self%boundaries, radius, position)
-    if (room .and. self%is_held) room = is_seen(self%boundaries, self%inner_point(1:self%nd), radius, position)
+    if (room .and. self%is_held) room = is_seen(self%boundaries, self%inner_point(1:self%nd), position)
   end function held_box_leaves_room
 
   !> What is wrong where grains find no places.
@@ -41,9 +41,10 @@ contains
     character(len=:), allocatable :: text
 
     if (self%is_held) then
-      text = "too many grains for the space that the boundaries leave them in the box"
+      text = "too many grains for the space inside the boundaries, or a box that has little of this space"
     else
       text = self%sample_box_t%too_many(fraction)
+      if (allocated(self%boundaries)) text = text//" beside the boundaries of the case, or these leave little of the box"
     end if
   end function held_box_too_many
 

@@ -191,7 +191,8 @@ contains
     found%points_left_out = points%left_out
   end subroutine find_contacts_of_shapes
 
-  !> Whether a wall without a thickness lies between the surfaces of two bodies at point `k` of pair `p`.
+  !> Whether a wall without a thickness lies between two bodies at point `k` of pair `p`: between their surfaces there, as far as
+  !> these reach into the wall, and between their centres. Thin bodies that lie on each other near a wall have it beside both.
   pure logical function is_screened(screens, decomposition, view, p, points, k) result(screened)
     type(screens_t), intent(in) :: screens
     type(decomposition_t), intent(in) :: decomposition
@@ -209,6 +210,10 @@ contains
         & points%normal(1:nd, k)
       place(:) = view%bodies%position(:, i) + points%point(1:nd, k) + 0.5_dp*branch
       screened = screens%part(decomposition, view, p, place, branch)
+      if (.not. screened) return
+      branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
+      if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
+      screened = screens%part(decomposition, view, p, view%bodies%position(:, i), branch)
     end associate
   end function is_screened
 

@@ -71,7 +71,7 @@ contains
           if (boundary%is_faceted()) then
             if (.not. at_facets) cycle
           end if
-          if (.not. is_between(boundary, place, branch)) cycle
+          if (.not. boundary%lies_between(place, branch)) cycle
           part = .not. (filter%lets_pass(view%bodies, decomposition%boundaries, list%candidate(pair), -b) .or. &
             & filter%lets_pass(view%bodies, decomposition%boundaries, list%antagonist(pair), -b))
           if (part) return
@@ -79,31 +79,5 @@ contains
       end do
     end associate
   end function screens_part
-
-  !> Whether a boundary lies between two points. A mesh that does not turn may be as wide as the period, so that its images are
-  !> looked at as well.
-  pure logical function is_between(boundary, place, branch) result(parts)
-    type(boundary_t), intent(in) :: boundary
-    real(dp), intent(in) :: place(:), branch(:)
-    real(dp) :: image(3), from(3), to(3)
-    integer :: images(3), i, j, k
-
-    call boundary%find_image(place, image)
-    image(:) = image - boundary%surface%point
-    images(:) = merge(1, 0, boundary%period > 0.0_dp .and. boundary%is_faceted() .and. .not. boundary%drive%turns())
-    do k = -images(3), images(3)
-      do j = -images(2), images(2)
-        do i = -images(1), images(1)
-          from(1) = image(1) + i*boundary%period(1)
-          from(2) = image(2) + j*boundary%period(2)
-          from(3) = image(3) + k*boundary%period(3)
-          to(:) = from
-          to(1:size(branch)) = from(1:size(branch)) - branch
-          parts = boundary%surface%parts(from, to)
-          if (parts) return
-        end do
-      end do
-    end do
-  end function is_between
 
 end module gravier_screens

@@ -82,13 +82,14 @@ contains
     ends(:, :, :) = 0.0_dp
     ends(1, 2, 1) = 1.0_dp
     ends(1, 1, 2) = 1.0_dp
-    ends(1:2, 2, 2) = [1.0_dp, 2.0_dp]
+    ends(1:2, 2, 2) = [2.0_dp, 2.0_dp]
     line%edge(1, 1) = 1.0_dp
     line%edge(2, 2) = 1.0_dp
     call line%take_facets(ends)
     call check(line%parts([0.5_dp, -0.1_dp, 0.0_dp], [0.5_dp, 0.1_dp, 0.0_dp]), "through the first part of a line")
-    call check(line%parts([1.5_dp, 1.9_dp, 0.0_dp], [0.5_dp, 1.9_dp, 0.0_dp]), "through the second")
-    call check(.not. line%parts([1.5_dp, 2.1_dp, 0.0_dp], [0.5_dp, 2.1_dp, 0.0_dp]), "beyond its end")
+    call check(line%parts([2.5_dp, 1.9_dp, 0.0_dp], [1.5_dp, 1.9_dp, 0.0_dp]), "through the second")
+    call check(.not. line%parts([2.5_dp, 2.1_dp, 0.0_dp], [1.5_dp, 2.1_dp, 0.0_dp]), "beyond its end")
+    call check(.not. line%parts([1.5_dp, -0.1_dp, 0.0_dp], [1.5_dp, 0.1_dp, 0.0_dp]), "beyond the first, below the second")
     call check(line%parts([0.9_dp, 0.1_dp, 0.0_dp], [1.1_dp, -0.1_dp, 0.0_dp]), "through its corner")
   end subroutine test_meshes
 
