@@ -2,6 +2,7 @@
 module gravier_contact_feature
   use gravier_kinds, only: dp
   use gravier_convex_piece, only: convex_piece_t, shares_corner
+  use gravier_polygon_clip, only: one_place
   implicit none
   private
   public :: placement_t, feature_t, frame_t
@@ -171,79 +172,173 @@ contains
       place(2, k) = dot_product(y, frame%second)
       place(3, k) = dot_product(y, frame%normal)
     end do
-    if (feature%face > 0 .and. m > 3) call drop_inner(sign(1.0_dp, dot_product(along, piece%face_normal(:, feature%face))), m, &
-      & vertex, place)
+    if (feature%face > 0 .and. m > 3) call drop_inner(sign(1.0_dp, dot_product(along, piece%face_normal(:, feature%face))), &
+      & one_place*feature%at%radius, m, vertex, place)
   end subroutine lay_out_feature
 
   !> Leave out corners where a polygon turns inwards, as it may beside a corner of which one side only was lengthened: what is left
-  !> are the corners of its convex hull, whatever corner the list begins with, and whichever way round it goes.
-  pure subroutine drop_inner(sense, m, vertex, place)
+  !> are the corners of its convex hull, whatever corner the list begins with, and whichever way round it goes. Corners at one place
+  !> stay or go together: rounding turns the side between them to anywhere.
+  pure subroutine drop_inner(sense, least, m, vertex, place)
     !> 1.0 for a polygon that is anticlockwise, -1.0 for one that is clockwise
     real(dp), intent(in) :: sense
+    !> corners this near to each other are at one place [m]
+    real(dp), intent(in) :: least
     integer, intent(inout) :: m, vertex(:)
     real(dp), intent(inout) :: place(:, :)
-    integer :: hull(m), n, k, number(m)
-    real(dp) :: at(3, m)
 
-    if (.not. turns_inwards(sense, place(1:2, 1:m))) return
-    n = 0
-    do k = 1, m
-      if (next_on_hull(sense, place(1:2, 1:m), k) > 0) exit
-    end do
-    do while (k <= m .and. n < m)
-      n = n + 1
-      hull(n) = k
-      k = next_on_hull(sense, place(1:2, 1:m), k)
-      if (k == 0 .or. k == hull(1)) exit
-    end do
-    if (n < 3) return
-    number(:) = vertex(1:m)
-    at(:, :) = place(:, 1:m)
-    do k = 1, n
-      vertex(k) = number(hull(k))
-      place(:, k) = at(:, hull(k))
-    end do
-    m = n
+    if (turns_inwards(sense, least, place(1:2, 1:m))) call keep_hull(sense, least, m, vertex, place)
   end subroutine drop_inner
 
-  !> Whether some corner of a polygon turns inwards.
-  pure logical function turns_inwards(sense, place)
-    real(dp), intent(in) :: sense, place(:, :)
-    real(dp) :: u(2), v(2)
-    integer :: k, m
+  !> Keep the corners of the convex hull of a polygon.
+  pure subroutine keep_hull(sense, least, m, vertex, place)
+    real(dp), intent(in) :: sense, least
+    integer, intent(inout) :: m, vertex(:)
+    real(dp), intent(inout) :: place(:, :)
+    integer :: hull(m), at(m), number(m), n, k, j, i, last
+    real(dp) :: spot(2, m), height(m)
 
-    m = size(place, 2)
-    turns_inwards = .true.
+    n = 0
     do k = 1, m
-      u(:) = place(:, k) - place(:, mod(k + m - 2, m) + 1)
-      v(:) = place(:, mod(k, m) + 1) - place(:, k)
-      if (sense*(u(1)*v(2) - u(2)*v(1)) < -inner*sqrt(dot_product(u, u)*dot_product(v, v))) return
+      do i = 1, n
+        if (max(abs(place(1, k) - spot(1, i)), abs(place(2, k) - spot(2, i))) <= least) exit
+      end do
+      at(k) = i
+      if (i > n) then
+        n = i
+        spot(:, i) = place(1:2, k)
+      end if
+      number(k) = vertex(k)
+      height(k) = place(3, k)
     end do
-    turns_inwards = .false.
+    call find_outline(sense, spot(:, 1:n), n, hull)
+    if (n < 3) return
+    m = 0
+    do k = 1, n
+      ! from the first of those that follow each other
+      do j = 1, size(at)
+        last = merge(size(at), j - 1, j == 1)
+        if (at(j) == hull(k) .and. at(last) /= hull(k)) exit
+      end do
+      do last = j, j + size(at) - 1
+        i = mod(last - 1, size(at)) + 1
+        if (at(i) /= hull(k)) cycle
+        m = m + 1
+        vertex(m) = number(i)
+        place(1:2, m) = spot(:, hull(k))
+        place(3, m) = height(i)
+      end do
+    end do
+  end subroutine keep_hull
+
+  !> The corners of the convex hull of places apart from each other, in turn from the lowest number on (R. A. Jarvis, Inf. Process.
+  !> Lett. 2 (1973) 18).
+  pure subroutine find_outline(sense, place, n, hull)
+    real(dp), intent(in) :: sense, place(:, :)
+    !> corners of the hull; 0 where it does not close, as for corners in a line
+    integer, intent(out) :: n, hull(:)
+    integer :: chain(size(hull)), k, next, first
+    real(dp) :: arriving(2)
+
+    arriving(1) = 0.0_dp
+    arriving(2) = -sense
+    next = minloc(place(1, :), 1)
+    n = 0
+    do while (all(chain(1:n) /= next))
+      k = next
+      n = n + 1
+      chain(n) = k
+      next = next_on_hull(sense, place, k, arriving)
+      if (next == 0) then
+        n = 0
+        return
+      end if
+      arriving(:) = place(:, next) - place(:, k)
+    end do
+    first = n
+    do while (chain(first) /= next)
+      first = first - 1
+    end do
+    n = n - first + 1
+    k = minloc(chain(first:first + n - 1), 1)
+    do next = 1, n
+      hull(next) = chain(first + modulo(next + k - 2, n))
+    end do
+  end subroutine find_outline
+
+  !> Whether some corner of a polygon turns inwards, or its sides go round more than once, as where three corners that blending has
+  !> brought near to each other make a loop.
+  pure logical function turns_inwards(sense, least, place)
+    !> length up to which sides do not count
+    real(dp), intent(in) :: sense, least
+    real(dp), intent(in) :: place(:, :)
+    real(dp) :: u(2), v(2)
+    integer :: k, rounds
+
+    do k = size(place, 2), 1, -1
+      u(:) = place(:, merge(1, k + 1, k == size(place, 2))) - place(:, k)
+      if (max(abs(u(1)), abs(u(2))) > least) exit
+    end do
+    turns_inwards = .true.
+    rounds = 0
+    do k = 1, size(place, 2)
+      v(:) = place(:, merge(1, k + 1, k == size(place, 2))) - place(:, k)
+      if (max(abs(v(1)), abs(v(2))) <= least) cycle
+      if (is_inner(u, v)) return
+      rounds = rounds + merge(1, 0, u(1) >= 0.0_dp .and. v(1) < 0.0_dp)
+      u(:) = v
+    end do
+    turns_inwards = rounds > 1
+
+  contains
+
+    pure logical function is_inner(u, v)
+      real(dp), intent(in) :: u(2), v(2)
+      is_inner = sense*(u(1)*v(2) - u(2)*v(1)) < 0.0_dp
+      if (is_inner) is_inner = sense*sine(u, v) < -inner
+    end function is_inner
+
   end function turns_inwards
 
-  !> The corner of the convex hull that follows corner `k`, the nearest of those in line; 0 where `k` is inside.
-  pure integer function next_on_hull(sense, place, k) result(next)
+  !> The corner of the convex hull that follows corner `k` of it: the outermost, or the nearest of those in line with it. 0 where
+  !> all others are where the hull comes from.
+  pure integer function next_on_hull(sense, place, k, arriving) result(next)
     real(dp), intent(in) :: sense, place(:, :)
     integer, intent(in) :: k
-    real(dp) :: u(2), v(2), length, nearest
-    integer :: i, j
+    !> side of the hull before corner `k`
+    real(dp), intent(in) :: arriving(2)
+    real(dp) :: u(2), v(2), nearest
+    integer :: j, outermost
 
-    next = 0
-    nearest = huge(1.0_dp)
+    outermost = 0
+    v(:) = 0.0_dp
     do j = 1, size(place, 2)
+      if (j == k) cycle
       u(:) = place(:, j) - place(:, k)
-      length = dot_product(u, u)
-      if (.not. length > 0.0_dp .or. length >= nearest) cycle
-      do i = 1, size(place, 2)
-        v(:) = place(:, i) - place(:, k)
-        if (sense*(u(1)*v(2) - u(2)*v(1)) < -inner*sqrt(length*dot_product(v, v))) exit
-      end do
-      if (i <= size(place, 2)) cycle
+      if (dot_product(arriving, u) < 0.0_dp .and. abs(sine(arriving, u)) <= inner) cycle
+      if (outermost > 0 .and. sense*(v(1)*u(2) - v(2)*u(1)) >= 0.0_dp) cycle
+      outermost = j
+      v(:) = u
+    end do
+    next = outermost
+    nearest = dot_product(v, v)
+    do j = 1, size(place, 2)
+      if (j == k .or. j == outermost) cycle
+      u(:) = place(:, j) - place(:, k)
+      if (dot_product(u, u) >= nearest) cycle
+      v(:) = place(:, outermost) - place(:, j)
+      if (dot_product(u, v) <= 0.0_dp) cycle
+      if (sense*sine(u, v) < -inner) cycle
       next = j
-      nearest = length
+      nearest = dot_product(u, u)
     end do
   end function next_on_hull
+
+  !> Sine of the angle from one vector to another, neither of which is 0.
+  pure real(dp) function sine(u, v)
+    real(dp), intent(in) :: u(2), v(2)
+    sine = (u(1)*v(2) - u(2)*v(1))/sqrt(dot_product(u, u)*dot_product(v, v))
+  end function sine
 
   !> Move a corner of a face towards its sharp place: within the face where both of its sides lie in the plane of contact, along a
   !> side where only that one does.

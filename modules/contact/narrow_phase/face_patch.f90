@@ -5,7 +5,7 @@ module gravier_face_patch
   use gravier_contact_feature, only: feature_t, frame_t, lay_out_feature, edge_number, face_number
   use gravier_contact_patch, only: patch_point_t, add_point
   use gravier_manifold, only: feature_base
-  use gravier_polygon_clip, only: clip_polygon, room_for_clip
+  use gravier_polygon_clip, only: clip_polygon, room_for_clip, one_place
   implicit none
   private
   public :: add_face_points
@@ -17,8 +17,13 @@ module gravier_face_patch
   type :: laid_out_t
     !> height above the origin, and slope, of its plane or line
     real(dp) :: height = 0.0_dp, slope(2) = 0.0_dp
+    !> corners this near are at one place, as some are
+    real(dp) :: least = 0.0_dp
+    logical :: joined = .false.
     !> number of its face, or of its edge, among the features of its piece
     integer :: number = 0
+    !> the face, or 0
+    integer :: face = 0
   end type laid_out_t
 
 contains
@@ -40,11 +45,13 @@ contains
     call lay_out_feature(b, feature_b, frame, nb, w, y)
     call find_plane(a, feature_a, frame, x, plane_a)
     call find_plane(b, feature_b, frame, y, plane_b)
+    plane_a%joined = has_joined(x(:, 1:na), plane_a%least)
+    plane_b%joined = has_joined(y(:, 1:nb), plane_b%least)
     ! seen along the normal, faces of a turn the other way round than those of b
     if (feature_b%n > 2) then
-      call clip_polygon(x(:, 1:na), y(:, 1:nb), 1.0_dp, m, place, label)
+      call clip_polygon(x(:, 1:na), y(:, 1:nb), 1.0_dp, plane_b%least, m, place, label)
     else
-      call clip_polygon(y(:, 1:nb), x(:, 1:na), -1.0_dp, m, place, label)
+      call clip_polygon(y(:, 1:nb), x(:, 1:na), -1.0_dp, plane_a%least, m, place, label)
       label(1:m) = -label(1:m)
     end if
     room = equal*min(feature_a%at%radius, feature_b%at%radius)
@@ -61,7 +68,8 @@ contains
       new%place(3) = 0.5_dp*(height_a - reach_a + height_b + reach_b)
       new%gap = height_a - height_b - reach_a - reach_b
       if (.not. new%gap < frame%alert) cycle
-      new%key = number_of(a, v(1:na), plane_a, key(1))*feature_base + number_of(b, w(1:nb), plane_b, key(2))
+      new%key = number_of(a, v(1:na), x(:, 1:na), plane_a, key(1))*feature_base
+      new%key = new%key + number_of(b, w(1:nb), y(:, 1:nb), plane_b, key(2))
       call add_point(new, frame%alert, min(feature_a%at%radius, feature_b%at%radius), n, point)
     end do
   end subroutine add_face_points
@@ -77,6 +85,7 @@ contains
     real(dp) :: normal(3), way(2), core(3)
     integer :: k
 
+    plane%least = one_place*feature%at%radius
     if (feature%face > 0) then
       associate (u => piece%face_normal(:, feature%face), x => piece%vertex(:, feature%vertex), at => feature%at)
         do k = 1, 3
@@ -89,6 +98,7 @@ contains
       plane%slope(1) = -dot_product(normal, frame%first)/dot_product(normal, frame%normal)
       plane%slope(2) = -dot_product(normal, frame%second)/dot_product(normal, frame%normal)
       plane%number = face_number(piece, feature%face)
+      plane%face = feature%face
       way(1) = dot_product(core, frame%first)
       way(2) = dot_product(core, frame%second)
       plane%height = dot_product(core, frame%normal) - dot_product(plane%slope, way)
@@ -189,19 +199,60 @@ contains
     is_idle = abs(u(1)*v(2) - u(2)*v(1)) <= room*min(long_u, long_v)
   end function is_idle
 
-  !> Number of what name_corner found among the features of a piece.
-  pure integer function number_of(piece, vertex, plane, name)
+  !> Number of what name_corner found among the features of a piece. Corners at one place have the lowest number of their vertices:
+  !> rounding decides which of them is found. A side has the number of the edge that begins at its first corner in the face.
+  pure integer function number_of(piece, vertex, x, plane, name)
     type(convex_piece_t), intent(in) :: piece
     integer, intent(in) :: vertex(:), name
+    !> corners
+    real(dp), intent(in) :: x(:, :)
     type(laid_out_t), intent(in) :: plane
+    integer :: k
 
     if (name < 0) then
       number_of = vertex(-name) - 1
+      if (.not. plane%joined) return
+      do k = 1, size(vertex)
+        if (max(abs(x(1, k) - x(1, -name)), abs(x(2, k) - x(2, -name))) > plane%least) cycle
+        number_of = min(number_of, vertex(k) - 1)
+      end do
     else if (name > 0 .and. size(vertex) > 2) then
-      number_of = edge_number(piece, vertex(name), vertex(mod(name, size(vertex)) + 1))
+      number_of = edge_number(piece, vertex(name), behind(piece, plane%face, vertex(name), name))
     else
       number_of = plane%number
     end if
   end function number_of
+
+  !> Whether some corner is at the place of the one before it.
+  pure logical function has_joined(x, least)
+    real(dp), intent(in) :: x(:, :), least
+    integer :: k, before
+
+    has_joined = .false.
+    before = size(x, 2)
+    do k = 1, size(x, 2)
+      has_joined = has_joined .or. max(abs(x(1, k) - x(1, before)), abs(x(2, k) - x(2, before))) <= least
+      before = k
+    end do
+  end function has_joined
+
+  !> The vertex behind another one in a face.
+  pure integer function behind(piece, face, vertex, place)
+    type(convex_piece_t), intent(in) :: piece
+    integer, intent(in) :: face, vertex
+    !> of that one among the corners, if none before it is left out
+    integer, intent(in) :: place
+    integer :: k
+
+    associate (first => piece%face_first(face), last => piece%face_first(face + 1) - 1)
+      k = first + place - 1
+      if (piece%face_vertex(k) /= vertex) then
+        do k = first, last
+          if (piece%face_vertex(k) == vertex) exit
+        end do
+      end if
+      behind = piece%face_vertex(merge(first, k + 1, k >= last))
+    end associate
+  end function behind
 
 end module gravier_face_patch

@@ -3,11 +3,14 @@ module gravier_polygon_clip
   use gravier_kinds, only: dp
   implicit none
   private
-  public :: clip_polygon, room_for_clip
+  public :: clip_polygon, room_for_clip, one_place
 
   !> a corner that is beyond a side by less than this part of the size of the polygon lies on it: where two edges are parallel and
   !> nearest to each other, they lie on one line, seen along the normal, and rounding is not to put one beside the other
   real(dp), parameter :: on_side = 1.0e-13_dp
+  !> corners that are nearer to each other than this part of the size of their piece are at one place, as those that blending has
+  !> brought to their common sharp corner: rounding turns the side between them
+  real(dp), parameter :: one_place = 1.0e-9_dp
 
 contains
 
@@ -18,12 +21,14 @@ contains
   end function room_for_clip
 
   !> Clip a polygon, or a segment as a polygon of two corners, against a convex one. What lies on a side of it, but for rounding, is
-  !> common to both.
-  pure subroutine clip_polygon(subject, clip, sense, n, place, label)
+  !> common to both. Sides between corners at one place do not clip.
+  pure subroutine clip_polygon(subject, clip, sense, least, n, place, label)
     !> corners in turn, first and second coordinate in the first two rows (3, corners)
     real(dp), intent(in) :: subject(:, :), clip(:, :)
     !> 1.0 where the corners of `clip` are anticlockwise, -1.0 where they are clockwise
     real(dp), intent(in) :: sense
+    !> corners of `clip` this near to each other are at one place
+    real(dp), intent(in) :: least
     !> corners of the common part
     integer, intent(out) :: n
     !> (2, room)
@@ -44,6 +49,7 @@ contains
       next = mod(s, size(clip, 2)) + 1
       way(1) = sense*(clip(1, next) - clip(1, s))
       way(2) = sense*(clip(2, next) - clip(2, s))
+      if (max(abs(way(1)), abs(way(2))) <= least) cycle
       m = 0
       do k = 1, n
         height(k) = way(1)*(place(2, k) - clip(2, s)) - way(2)*(place(1, k) - clip(1, s))

@@ -21,6 +21,8 @@ program test_convex_contact
     & half => half_core, straight
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
+  !> corners of polygons nearer than this are at one place
+  real(dp), parameter :: near = 1.0e-9_dp
   real(dp), parameter :: pi = acos(-1.0_dp), tight = 1.0e-13_dp
   type(body_shape_t) :: box, rod, ball
 
@@ -430,7 +432,7 @@ contains
     other(:, :) = square
     other(1, :) = square(1, :) + 1.5_dp
     other(2, :) = square(2, :) + 1.0_dp
-    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call clip_polygon(square, other, 1.0_dp, near, n, place, label)
     call check_equal(n, 4, "the common part of two squares has four corners")
     call check_close(area_of(n, place), 0.5_dp, tight, "its area")
     call check_equal(count(label(1:4) > 0), 2, "two sides are those of the first")
@@ -438,34 +440,34 @@ contains
     do k = 1, 4
       turned(:, k) = other(:, 5 - k)
     end do
-    call clip_polygon(square, turned, -1.0_dp, n, place, label)
+    call clip_polygon(square, turned, -1.0_dp, near, n, place, label)
     call check_close(area_of(n, place), 0.5_dp, tight, "a square that is clockwise")
     other(1, :) = [c, 0.0_dp, -c, 0.0_dp]
     other(2, :) = [0.0_dp, c, 0.0_dp, -c]
-    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call clip_polygon(square, other, 1.0_dp, near, n, place, label)
     call check_equal(n, 8, "a square on its corner cuts all corners off")
     call check_close(area_of(n, place), 8*(c - 1.0_dp), tight, "and leaves a regular octagon")
     do k = 1, 8
       call check(label(k)*label(mod(k, 8) + 1) < 0, "whose sides are of both in turn")
     end do
     turned(:, :) = 0.1_dp*square
-    call clip_polygon(turned, other, 1.0_dp, n, place, label)
+    call clip_polygon(turned, other, 1.0_dp, near, n, place, label)
     call check_close(area_of(n, place), 0.04_dp, tight, "a square within is left as it is")
     other(1, :) = other(1, :) + 4.0_dp
-    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call clip_polygon(square, other, 1.0_dp, near, n, place, label)
     call check_equal(n, 0, "squares apart have nothing in common")
     ! side by side, seen from both: rounding does not decide
     do k = -1, 1
       other(:, :) = square
       other(1, :) = square(1, :) + 2.0_dp + k*4*epsilon(1.0_dp)
       other(2, :) = square(2, :) + 0.5_dp
-      call clip_polygon(square, other, 1.0_dp, n, place, label)
+      call clip_polygon(square, other, 1.0_dp, near, n, place, label)
       call check(n >= 2, "squares side by side have a stretch of their sides in common")
       call check_close(maxval(place(2, 1:n)) - minval(place(2, 1:n)), 1.5_dp, tight, "all of it")
       call check_close(area_of(n, place), 0.0_dp, tight, "which has no area")
     end do
     other(1, :) = square(1, :) + 2.0_dp + 1.0e-9_dp
-    call clip_polygon(square, other, 1.0_dp, n, place, label)
+    call clip_polygon(square, other, 1.0_dp, near, n, place, label)
     call check_equal(n, 0, "squares that are just apart have nothing in common")
   end subroutine test_clip
 
@@ -479,7 +481,7 @@ contains
     segment(:, :) = 0.0_dp
     segment(1, :) = [-3.0_dp, 0.5_dp]
     segment(2, :) = 0.25_dp
-    call clip_polygon(segment, square, 1.0_dp, n, place, label)
+    call clip_polygon(segment, square, 1.0_dp, near, n, place, label)
     call check_equal(n, 3, "a segment is cut there and back")
     call check_close(minval(place(1, 1:n)), -1.0_dp, tight, "at the border")
     call check_close(maxval(place(1, 1:n)), 0.5_dp, tight, "its end within stays")

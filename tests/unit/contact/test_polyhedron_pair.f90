@@ -1,10 +1,11 @@
-!> Contacts of rounded convex pieces: cubes in all positions, capsules and spheres, half-spaces.
+!> Contacts of rounded convex pieces: cubes in all positions, capsules and spheres, hulls of random corners, half-spaces.
 program test_polyhedron_pair
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_convex_piece, only: convex_piece_t
-  use gravier_convex_distance, only: placed_pair_t
+  use gravier_convex_distance, only: placed_pair_t, core_distance_t, find_core_distance
+  use gravier_known_corners, only: random_polyhedron
   use gravier_manifold, only: manifold_t, most_points, feature_base
   use gravier_simple_shapes, only: make_polyhedron, make_box, make_capsule
   use gravier_polyhedron_pair, only: find_polyhedron_manifold, find_halfspace_manifold
@@ -38,6 +39,8 @@ program test_polyhedron_pair
   call test_all_points()
   call test_keys_of_flush_faces()
   call test_swap()
+  call test_hulls(12)
+  call test_hulls(40)
   call finish_checks()
   call MPI_Finalize()
 
@@ -543,5 +546,118 @@ contains
     end do
     call check(met > 50, "seen from the other: enough contacts")
   end subroutine test_swap
+
+  !> Hulls of random corners, most of which have several vertices in each face, mostly with a face of each against the other. Points
+  !> are the same whatever rounding does to the way between the hulls, seen from the other one, and in a mirror.
+  subroutine test_hulls(corners)
+    integer, intent(in) :: corners
+    type(body_shape_t) :: hull, image
+    type(manifold_t) :: first, other
+    type(draws_t) :: draws
+    type(turn_t) :: turn, seen
+    type(vector_t) :: way, shift, place
+    real(dp), allocatable :: corner(:, :)
+    integer :: trial, k, met
+
+    call random_polyhedron(3, corners, [1.5_dp, 1.25_dp, 1.0_dp], corner)
+    call make_hull("hull", corner, hull)
+    corner(1, :) = -corner(1, :)
+    call make_hull("image", corner, image)
+    met = 0
+    do trial = 1, 400
+      call lay_hulls(hull, trial, draws, turn, way)
+      if (.not. norm2(way%x) > 0.0_dp) cycle
+      call meet(hull, hull, turn, way, first, most_points)
+      call check(first%n > 0, "hulls: points")
+      if (first%n >= 3) met = met + 1
+      do k = 1, 8
+        shift = draws%direction()
+        place%x(:) = way%x + shift%x
+        place%x(:) = place%x - shift%x
+        call meet(hull, hull, turn, place, other, most_points)
+        call check_equal(other%n, first%n, "hulls shifted together: points")
+        call check(.not. any(other%key(1:first%n) /= first%key(1:first%n)), "hulls shifted together: keys")
+        call check(covers(other, first) .and. covers(first, other), "hulls shifted together: places")
+      end do
+      seen = inverse(turn)
+      place = on(seen, way)
+      place%x(:) = -place%x
+      call meet(hull, hull, seen, place, other, most_points)
+      do k = 1, other%n
+        place = on(turn, vector_t(other%point(:, k)))
+        other%point(:, k) = place%x + way%x
+      end do
+      call check(covers(other, first) .and. covers(first, other), "hulls seen from the other: places")
+      seen = turn
+      seen%m(1, 2:3) = -seen%m(1, 2:3)
+      seen%m(2:3, 1) = -seen%m(2:3, 1)
+      place = way
+      place%x(1) = -place%x(1)
+      call meet(image, image, seen, place, other, most_points)
+      other%point(1, 1:other%n) = -other%point(1, 1:other%n)
+      call check(covers(other, first) .and. covers(first, other), "hulls in a mirror: places")
+    end do
+    call check(met > 200, "hulls: enough patches")
+  end subroutine test_hulls
+
+  subroutine make_hull(name, corner, hull)
+    character(len=*), intent(in) :: name
+    real(dp), intent(in), contiguous :: corner(:, :)
+    type(body_shape_t), intent(out) :: hull
+    type(error_t), allocatable :: error
+
+    call make_polyhedron(name, corner, 0.025_dp, hull, error)
+    call check(.not. allocated(error), "a hull of random corners")
+  end subroutine make_hull
+
+  !> Where the second of two equal hulls is that touches the first: turned at random, or with a face nearly on one of the first. No
+  !> way where they overlap.
+  subroutine lay_hulls(hull, trial, draws, turn, way)
+    type(body_shape_t), intent(in) :: hull
+    integer, intent(in) :: trial
+    type(draws_t), intent(inout) :: draws
+    type(turn_t), intent(out) :: turn
+    type(vector_t), intent(out) :: way
+    type(vector_t) :: a, b, axis
+    type(placed_pair_t) :: pair
+    type(core_distance_t) :: found
+    integer :: n, face, k
+
+    associate (piece => hull%piece(1))
+      n = size(piece%face_normal, 2)
+      face = 1 + modulo(trial, n)
+      a%x(:) = piece%face_normal(:, face)
+      b%x(:) = -piece%face_normal(:, 1 + modulo(face + int(draws%between(0.0_dp, n - 1.1_dp)), n))
+      axis = vec(b%x(2)*a%x(3) - b%x(3)*a%x(2), b%x(3)*a%x(1) - b%x(1)*a%x(3), b%x(1)*a%x(2) - b%x(2)*a%x(1))
+      turn = about(axis, atan2(norm2(axis%x), dot_product(a%x, b%x)))
+      turn = between(about(a, draws%between(-pi, pi)), turn)
+      axis = draws%direction()
+      turn = between(about(axis, 10.0_dp**draws%between(-17.0_dp, -2.0_dp)), turn)
+      if (modulo(trial, 8) == 0) turn = random_turn(draws)
+      axis = draws%direction()
+      way%x(:) = hull%size*(2.1_dp*a%x + 0.3_dp*axis%x)
+      pair%radius_a = hull%size
+      pair%radius_b = hull%size
+      pair%rotation(:, :) = turn%m
+      do k = 1, 4
+        pair%way(:) = way%x
+        call find_core_distance(piece, piece, pair, 10.0_dp, found)
+        if (found%overlap) way%x(:) = 0.0_dp
+        if (found%overlap) return
+        way%x(:) = way%x + (found%distance - 2*hull%size*piece%rounding)*found%normal
+      end do
+    end associate
+  end subroutine lay_hulls
+
+  !> Whether each point of one manifold is near one of another. Points that are nearer than 1e-5 of the size may be one.
+  logical function covers(one, other)
+    type(manifold_t), intent(in) :: one, other
+    integer :: k
+
+    covers = .true.
+    do k = 1, other%n
+      covers = covers .and. has_point(one, vector_t(other%point(:, k)), 1.0e-4_dp)
+    end do
+  end function covers
 
 end program test_polyhedron_pair
