@@ -229,8 +229,8 @@ contains
     if (size(x) == 2) call near%join_lines()
   end subroutine boundary_find_facets
 
-  !> Whether its surface, which has no thickness, lies between two points: the line from one to the other goes through it. A mesh that
-  !> does not turn may be as wide as the period, so that its images are looked at as well.
+  !> Whether its surface, which has no thickness, lies between two points: the line from one to the other goes through it. A mesh
+  !> that does not turn may be as wide as the period, so that its images are looked at as well.
   pure logical function boundary_lies_between(self, place, branch) result(between)
     class(boundary_t), intent(in) :: self
     !> a point, and the way to it from the other one (nd) [m]
