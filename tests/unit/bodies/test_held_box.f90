@@ -61,6 +61,8 @@ contains
     boundaries(1)%period(1) = 3.0_dp
     boundaries(2)%period(1) = 3.0_dp
     call check(is_seen(boundaries, from, [2.1_dp, 0.0_dp]), "an image that is seen")
+    boundaries(1)%period(1) = 0.0_dp
+    boundaries(2)%period(1) = 0.0_dp
     boundaries(2)%present = .false.
     call check(is_seen(boundaries, from, [0.5_dp, 0.0_dp]), "a segment that is taken away")
     call check(is_seen(boundaries(1:0), from, [9.0_dp, 0.0_dp]), "no boundaries")
