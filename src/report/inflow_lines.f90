@@ -15,8 +15,8 @@ module gravier_inflow_lines
 
 contains
 
-  !> Warnings, each a line ended by a newline, and their number: masses below that of the first grain, rates at which grains enter
-  !> faster than they leave the region, or of more grains than may enter in a step.
+  !> Warnings, each a line ended by a newline, and their number: a scene without grains that none enter, masses below that of the
+  !> first grain, rates at which grains enter faster than they leave the region, or of more grains than may enter in a step.
   subroutine inflow_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text
@@ -27,6 +27,10 @@ contains
 
     text = ""
     number = 0
+    if (simulation%n_grains == 0 .and. .not. simulation%inflow%exists()) then
+      number = 1
+      text = "warning     the scene has no grain, and no &insertion lets grains in"//newline
+    end if
     do i = 1, size(simulation%inflow%insertions)
       associate (insertion => simulation%inflow%insertions(i))
         if (insertion%entered == 0 .and. insertion%most_grains > 0 .and. insertion%is_complete()) then

@@ -135,8 +135,8 @@ contains
     call glue(comm, config, data, scene, error)
   end subroutine make_scene
 
-  !> Refuse a scene without grains, and places so far from the origin that rounding would hide the gaps between grains. Errors are
-  !> the same on all ranks. Collective.
+  !> Refuse places so far from the origin that rounding would hide the gaps between grains. Errors are the same on all ranks.
+  !> Collective.
   subroutine check_places(comm, config, data, scene, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -146,11 +146,7 @@ contains
     real(dp) :: far, far_off
     integer :: k
 
-    if (scene%n_grains == 0 .and. size(scene%insertions) == 0) then
-      call raise(error, status_input, config%file//": &scene bodies_file = '"//trim(config%scene%bodies_file)// &
-        & "': the file has no grain: expected at least one, or an &insertion that lets grains in")
-      return
-    end if
+    if (scene%n_grains == 0 .and. size(scene%insertions) == 0) return
     far = farthest_place(comm, data%radius)
     do k = 1, size(scene%insertions)
       far = min(far, sharpest*scene%insertions(k)%radii%smallest())

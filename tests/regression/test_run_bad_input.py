@@ -298,7 +298,6 @@ def changed(old, new):
 CSV_FILES = [
     ("missing", None, ("No such file",)),
     ("empty", "", ("empty", "names of the columns")),
-    ("no bodies", "id,x,y,radius\n", ("the file has no grain: expected at least one, or an &insertion that lets grains in",)),
     ("no column radius", "id,x,y\n1,0,0\n", ("id, x, y, radius", "required", "id,x,y")),
     ("no column y", "id,x,radius\n1,0,1\n", ("id, x, y, radius", "required")),
     ("unknown column", "id,x,y,radius,colour\n1,0,0,1,red\n", ("column colour is unknown in 2D", "known are")),

@@ -237,6 +237,15 @@ class Scales(RunTestCase):
                                  "rounding changes such motion by up to 93.13 %; put the origin nearer to the scene"])
         self.assertEqual(self.warnings(self.check_case(case, {"time": {"step": 1e-2}})), [])
 
+    def test_no_grains(self):
+        """A file without a row is a scene in which nothing can happen; with an insertion it is one that is filled."""
+        os.makedirs(self.here("check"), exist_ok=True)
+        write(os.path.join(self.here("check"), "none.csv"), "id,x,y,radius\n")
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "none.csv"}, "time": {"step": 1e-3, "steps": 10}}
+        self.assertEqual(self.warnings(self.check_case(case)), ["warning     the scene has no grain, and no &insertion lets grains in"])
+        feed = {"insertion": {"lower": [0.0, 0.1], "upper": [0.1, 0.2], "radius": 0.01, "rate": 10.0}}
+        self.assertEqual(self.warnings(self.check_case(case, feed)), [])
+
     def test_slip_scale(self):
         """Errors of a tenth of g h are as large as the slip at which static friction is lost: ten layers that are shaken below their limit slide."""
         law = {"material": {"name": "a"}, "scene": {"wall_material": "a"}}
