@@ -15,9 +15,10 @@ module gravier_rounding_lines
 
 contains
 
-  !> Warnings, each a line ended by a newline, and their number. A body moves in two halves of a step, of which each is rounded to
-  !> the spacing of numbers at its place: that is wrong by up to this spacing over the way of the step, with one sign where the
-  !> velocity stays. The velocities looked at are that of the velocity scale, and the constant ones of boundaries. Collective.
+  !> Warnings, each a line ended by a newline, and their number. A body moves in two halves of a step. Rounding makes each half
+  !> wrong by up to half of the spacing of numbers at its place, so that a step is wrong by up to this spacing over its length. The
+  !> errors have one sign as long as the velocity stays the same. The velocities looked at are the velocity scale and the constant
+  !> velocities of boundaries. Collective.
   subroutine rounding_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text

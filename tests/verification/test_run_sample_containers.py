@@ -131,6 +131,17 @@ class Containers(RunTestCase):
         self.assertGreater((distance - found.radius).min(), 0.0)
         self.assertGreater((found.position[:, 0] < 0.3).sum(), 5)
 
+    def test_outlet(self):
+        """Grains that leave through an outlet while the sample settles are counted in the log; those over the floor stay."""
+        case = merged(BASE, {"sample": {"container": "box", "box": [0.6, 0.4], "count": 60, "preparation": "settled"}, "scene": {"period_origin": [0.0, 0.2]}})
+        case["boundary"] = [{"name": "shelf", "shape": "segment", "point": [0.0, 0.4], "end": [0.3, 0.4]},
+                            {"name": "out", "shape": "outlet", "point": [0.0, 0.22], "normal": [0.0, 1.0]}]
+        run = make(case, self.here("outlet"))
+        self.assert_status(run, 0)
+        left = 60 - len(Bodies(run.path("sample.h5")).id)
+        self.assertTrue(10 < left < 60)
+        self.assertIn(f"warning     *** {left} grains left through outlets\n", run.stdout)
+
     def test_refused(self):
         """One line, status 2, no bodies file."""
         refused = {

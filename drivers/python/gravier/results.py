@@ -274,7 +274,7 @@ class Run:
 
     def region_mean(self, name, steps=None):
         """The means over written steps, all after the start unless told, of a region, a row a bin with the columns of `region`. Velocities and
-        granular temperatures are weighted by the volume of the grains in the bin, contacts_per_grain by their number, else NaN."""
+        granular temperatures are weighted by the volume of the grains in the bin, contacts_per_grain by their number. Empty bins have NaN."""
         steps = [step for step in self.steps if step > 0] if steps is None else list(steps)
         if not steps:
             raise ResultsError(f"{self.path}: no step with means over regions; expected one after the start")

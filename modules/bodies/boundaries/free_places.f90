@@ -35,8 +35,8 @@ contains
     clear = .true.
   end function is_clear
 
-  !> Whether the straight line from a point inside boundaries to a place that is clear of them meets none, or that to one of its
-  !> images. The insides of planes, circles and cylinders are convex, so that what lies inside is seen.
+  !> Whether a straight line leads from a point inside boundaries to a place, or to a periodic image of it, and meets no boundary.
+  !> The place is clear of boundaries. The insides of planes, circles and cylinders are convex, so that what lies inside is seen.
   pure logical function is_seen(boundaries, from, position) result(seen)
     type(boundary_t), intent(in) :: boundaries(:)
     !> (nd) [m]

@@ -10,7 +10,7 @@ module gravier_held_box
 
   type, extends(sample_box_t) :: held_box_t
     type(boundary_t), allocatable :: boundaries(:)
-    !> whether they hold the grains, which are then to be seen from the inner point
+    !> whether they hold the grains, each of which then has to be in sight of the inner point
     logical :: is_held = .false.
     !> [m]
     real(dp) :: inner_point(3) = 0.0_dp
@@ -21,7 +21,8 @@ module gravier_held_box
 
 contains
 
-  !> Whether boundaries leave a grain its place: it overlaps none, and none that holds the grains is before it.
+  !> Whether boundaries leave room for a grain at a place: it overlaps none of them, and where they hold the grains none lies
+  !> between the inner point and the place.
   pure logical function held_box_leaves_room(self, radius, position) result(room)
     class(held_box_t), intent(in) :: self
     !> [m]; (nd) [m]

@@ -77,7 +77,7 @@ contains
     end do
   end subroutine box_random_place
 
-  !> Whether there is room for a grain at a place in the box, but for other grains.
+  !> Whether there is room for a grain at a place in the box, other grains aside.
   pure logical function box_leaves_room(self, radius, position) result(room)
     class(sample_box_t), intent(in) :: self
     !> [m]; (nd) [m]

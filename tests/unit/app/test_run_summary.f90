@@ -98,6 +98,13 @@ contains
       end if
       call check(index(verdict_text(simulation), expected) == 1, "the last words")
     end do
+    ! most ended at max_iterations, and one found no solution
+    simulation%tally%stagnated = 0
+    simulation%tally%exhausted = 3
+    do round = 0, 1
+      simulation%tally%unbounded = round
+      call check((index(mending_text(simulation), "more room") > 0) .eqv. round == 1, "more room where a solve has no solution")
+    end do
     call simulation%free()
   end subroutine test_misses
 
