@@ -366,7 +366,7 @@ contains
     if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%refinement%doubt(figures%uncertain_velocity(self%velocity_scale%bonds), &
-      & self%control%accuracy*self%velocity_scale%value), self%halo, doubtful)
+      & self%control%accuracy*self%velocity_scale%value), self%velocity_scale%moves(), self%halo, doubtful)
     if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, self%velocity_scale%moves() .or. self%method%keeps_best)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)

@@ -11,8 +11,9 @@ module gravier_bonded_law
   private
   public :: bonded_law_t
 
-  !> state of a pair with an intact bond; that of all others is 0
-  integer, parameter :: intact = 1
+  !> State of a pair with an intact bond; that of all others is 0. A bond that opens by less than the solve may be wrong counts by
+  !> how much, in so many parts of what the solve of one step may be wrong, and breaks after so many times that.
+  integer, parameter :: intact = 1, parts = 1000, most_opened = 2
 
   type, extends(contact_law_t) :: bonded_law_t
     real(dp) :: friction = 0.0_dp
@@ -70,7 +71,7 @@ contains
 
     pair%terms%friction = self%friction
     if (pair%first .and. pair%gap <= self%bond_distance) pair%state = intact
-    if (pair%state /= intact) return
+    if (pair%state == 0) return
     pair%terms%friction = self%bond_friction
     pair%terms%attraction = self%bond_strength
     pair%terms%free_gap = 0.0_dp
@@ -78,16 +79,24 @@ contains
   end subroutine bonded_evaluate
 
   !> A bond at its limit breaks if its bodies part or slide faster than the solve may be wrong. One that moves less is in doubt.
+  !> Where bodies move, solves are compared with their motion, and a joint about which a long body turns opens slowly beside it. Such a
+  !> bond breaks once it has opened for several steps in a row, because errors of solves do not keep their sign.
   pure subroutine bonded_conclude(self, pair)
     class(bonded_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
     logical :: at_limit
 
     pair%doubtful = .false.
-    if (pair%state /= intact) return
+    if (pair%state == 0) return
     ! this holds of a bond under its full tension, too: both impulses are 0
     at_limit = pair%tangential >= (1.0_dp - unused)*self%bond_friction*pair%normal
     pair%doubtful = at_limit .and. .not. pair%motion > pair%uncertain
+    if (.not. at_limit) then
+      pair%state = intact
+    else if (pair%doubtful .and. pair%in_motion .and. pair%uncertain > 0.0_dp) then
+      pair%state = max(intact, pair%state + nint(parts*max(pair%parting/pair%uncertain, -real(most_opened, dp))))
+      pair%doubtful = pair%state <= intact + most_opened*parts
+    end if
     if (at_limit .and. .not. pair%doubtful) pair%state = 0
   end subroutine bonded_conclude
 

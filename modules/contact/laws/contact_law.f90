@@ -57,6 +57,10 @@ module gravier_contact_law
     !> once the step is solved, of a law that breaks: how fast the bodies part or slide on each other, beside what their joint
     !> allows, and the velocity up to which the solve may be wrong about that [m/s]
     real(dp) :: motion = 0.0_dp, uncertain = 0.0_dp
+    !> how fast they part, < 0 where they come back [m/s]
+    real(dp) :: parting = 0.0_dp
+    !> the bodies of the scene move by more than errors of the solve are compared with
+    logical :: in_motion = .false.
     !> made by `conclude`: it is at its limit, and the solve is not exact enough to tell whether it breaks
     logical :: doubtful = .false.
   end type contact_pair_t

@@ -137,12 +137,14 @@ contains
   end subroutine find_reduced
 
   !> The states of the pairs of a solved problem, whose impulses and velocities are those of the solve.
-  subroutine conclude_pairs(problem, boundaries, laws, uncertain, halo, doubtful)
+  subroutine conclude_pairs(problem, boundaries, laws, uncertain, in_motion, halo, doubtful)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     !> velocity up to which the solve may be wrong about what a contact does [m/s]
     real(dp), intent(in) :: uncertain
+    !> bodies move by more than errors of the solve are compared with
+    logical, intent(in) :: in_motion
     type(halo_t), intent(inout) :: halo
     !> some bond is at its limit, and the solve is not exact enough to tell whether it breaks
     logical, intent(out) :: doubtful
@@ -152,6 +154,7 @@ contains
 
     doubtful = .false.
     pair%uncertain = uncertain
+    pair%in_motion = in_motion
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
         if (laws%breaks) call find_slips(problem, s, v)
@@ -164,7 +167,10 @@ contains
           pair%gap = sub%gap(c)
           pair%normal = sub%impulse(q, 1, g)
           pair%tangential = norm2(sub%impulse(q, 2:nf, g))
-          if (laws%breaks) pair%motion = hypot(max(v(q, 1, g), 0.0_dp), norm2(v(q, 2:nf, g)))
+          if (laws%breaks) then
+            pair%parting = v(q, 1, g)
+            pair%motion = hypot(max(pair%parting, 0.0_dp), norm2(v(q, 2:nf, g)))
+          end if
           call laws%of(l)%law%conclude(pair)
           view%list%state(view%list%memory%law_row, p) = pair%state
           doubtful = doubtful .or. pair%doubtful

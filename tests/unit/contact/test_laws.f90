@@ -329,9 +329,54 @@ contains
     call check_equal(pair%state, 0, "bonded: a bond at its strength that opens breaks")
     call law%conclude(pair)
     call check_equal(pair%state, 0, "bonded: a broken bond stays broken")
+    call check_opening(law)
   end subroutine check_bonded
 
-  !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
+  !> Bonds at their limit that open by a quarter of what a solve may be wrong, step after step.
+  subroutine check_opening(law)
+    type(bonded_law_t), intent(in) :: law
+    type(contact_pair_t) :: pair
+    integer :: k
+
+    pair%state = 1
+    pair%uncertain = 0.02_dp
+    pair%motion = 0.005_dp
+    pair%parting = 0.005_dp
+    do k = 1, 20
+      call law%conclude(pair)
+    end do
+    call check_equal(pair%state, 1, "opening: nothing is counted where bodies do not move")
+    call check(pair%doubtful, "opening: it is in doubt")
+    pair%in_motion = .true.
+    do k = 1, 8
+      call law%conclude(pair)
+      call check(pair%state > 0 .and. pair%doubtful, "opening: a bond stays that has opened by less than two errors")
+    end do
+    pair%parting = -0.005_dp
+    do k = 1, 20
+      call law%conclude(pair)
+    end do
+    call check_equal(pair%state, 1, "opening: it has come back, and there is nothing less than that")
+    pair%parting = 0.005_dp
+    do k = 1, 8
+      call law%conclude(pair)
+    end do
+    pair%normal = 1.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 1, "opening: a bond that holds again has opened by nothing")
+    pair%normal = 0.0_dp
+    do k = 1, 9
+      call law%conclude(pair)
+    end do
+    call check_equal(pair%state, 0, "opening: it breaks once it has opened by more")
+    call check(.not. pair%doubtful, "opening: there is no doubt about that")
+    pair%state = 1
+    pair%uncertain = 0.0_dp
+    pair%motion = 0.0_dp
+    call law%conclude(pair)
+    call check_equal(pair%state, 1, "opening: without errors and motion it stays")
+  end subroutine check_opening
+
   !> Stiffness as it is given, or by a number, a pressure and a breadth; which of them is wanted.
   subroutine check_elastic()
     type(elastic_law_t) :: law
@@ -406,6 +451,7 @@ contains
     call check(pair%spring%stiffness(1) > 0.0_dp .and. pair%spring%stiffness(1) < 1.0e-4_dp*k*sqrt(radius), "hardly any, but some")
   end subroutine check_hertz
 
+  !> Pairs of materials in either order; what has no material, or no law, is under the scene's values.
   subroutine check_law_set()
     character(len=*), parameter :: names = "adhesion_range friction restitution adhesion"
     type(law_set_t) :: laws
