@@ -241,13 +241,13 @@ def components(rows, column, dimension, axis):
 
 
 def draw_profile(run, name, steps, columns, mean):
-    """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. A
-    position along the height of the scene is drawn upwards."""
+    """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. Without
+    steps these are the last one or, with `mean`, all written ones. A position along the height of the scene is drawn upwards."""
     known = [*PROFILES, *parts_of(run.dimension)]
     for column in columns:
         if column not in known:
             raise PictureError(f"no column {column} of a profile; expected one of {', '.join(known)}")
-    steps = [step for step in run.steps if step > 0] if steps == "all" else sorted({run.find_step(step) for step in steps or [None]})
+    steps = [step for step in run.steps if step > 0] if steps == "all" or mean and not steps else sorted({run.find_step(step) for step in steps or [None]})
     if not steps:
         raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
     name, axis = region_with_bins(run, name, steps[-1])

@@ -77,8 +77,8 @@ def parse(arguments):
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")
     profile.add_argument("--region", metavar="NAME", help="a region with bins; the only one unless told")
-    profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; the last one unless told")
-    profile.add_argument("--mean", action="store_true", help="the mean over these steps in the place of a line a step; velocities are weighted by the volume of grains")
+    profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; unless told the last one, and with --mean all")
+    profile.add_argument("--mean", action="store_true", help="the mean over the steps in the place of a line a step; velocities are weighted by the volume of grains")
     profile.add_argument("--columns", default="solid_fraction,velocity,stress", metavar="A,B", help="%(default)s unless told")
     # numbers as -1e-3 are no options
     packing._negative_number_matcher = NEGATIVE

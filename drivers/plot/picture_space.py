@@ -9,6 +9,8 @@ import gravier
 
 #: angles of the points of a circle
 ARC = numpy.linspace(0.0, 2.0 * numpy.pi, 97)
+#: of a step, by which the time of a removal is rounded
+ROUNDED = 1e-6
 #: a normal whose component is above this lies along an axis
 ALONG = 0.999
 
@@ -40,12 +42,16 @@ class View:
 
 
 class Walls:
-    """Boundaries that are there at a step: their rows, the keys of each in the case, and facets of mesh walls (n, d, d)."""
+    """Boundaries that are there in a step: their rows, the keys of each in the case, and facets of mesh walls (n, d, d). One that is removed at the
+    end of a step has forces in this step."""
 
     def __init__(self, run, step):
-        rows, time = run.boundaries(step), run.time(step)
+        rows = run.boundaries(step)
         known = {keys.get("name", f"boundary {k}"): keys for k, keys in enumerate(run.case.get("boundary", []), 1)}
-        there = numpy.array([time < known.get(name, {}).get("remove_at", numpy.inf) for name in rows.name], dtype=bool)
+        ends = numpy.array([known.get(name, {}).get("remove_at", numpy.inf) for name in rows.name], dtype=float)
+        # the beginning of the step; what goes at the very start is never there
+        began = max(run.time(step) - (1.0 - ROUNDED) * run.time_step(), 0.0) if numpy.isfinite(ends).any() else 0.0
+        there = began < ends
         self.rows = gravier.Table({key: values[there] for key, values in rows.items()})
         self.keys = [known.get(name, {}) for name in rows.name[there]]
         facets = run.facets(step)

@@ -11,7 +11,7 @@ OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
 SHALLOW, DEEP = 0.02, 0.1
 #: the question whose answer says nothing of the run
 FILES = "Are its files there and whole?"
-#: the parts of the energy turned over up to which a balance is one, and up to which it is nearly one
+#: the parts of the sizes of its terms up to which a balance is one, and up to which it is nearly one
 BALANCED, UNBALANCED = 1e-4, 1e-2
 
 
@@ -151,11 +151,11 @@ def too_fast(history):
 
 def balanced(log):
     said = log.value("energy")
-    found = re.match(r"balance off by (\S+) J, of (\S+) J turned over", said)
+    found = re.match(r"balance off by (\S+) J; the sizes of its terms sum up to (\S+) J", said)
     if not found:
         return []
-    off, turned = (float(text) for text in found.groups())
-    grade = GOOD if off <= BALANCED * turned else DOUBT if off <= UNBALANCED * turned else BAD
+    off, terms = (float(text) for text in found.groups())
+    grade = GOOD if off <= BALANCED * terms else DOUBT if off <= UNBALANCED * terms else BAD
     since = " These are the energies since the last restart." if log.restarts > 0 else ""
     return [Answer("Do the energies balance?", grade, said[0].upper() + said[1:] + "." + since)]
 

@@ -397,7 +397,7 @@ contains
     if (allocated(error)) return
     associate (solve => figures%solve)
       if (solve%status /= solve_converged) self%failed = self%failed + 1
-      call self%tally%add_solve(solve, self%velocity_scale%kind)
+      call self%tally%add_solve(solve, self%velocity_scale%kind, self%step + 1)
       self%figure_ratio = solve%figure_ratio
       call self%pass_backoff%note(self%step, tried=solve%layered_sweeps > 0.0_dp, kept=solve%layered)
       call find_cause(self%problem, solve%status, figures%cause)

@@ -156,7 +156,7 @@ contains
         turnover = energy%turnover()
       end select
     end if
-    text = "balance off by "//to_text(abs(off), 2)//" J, of "//to_text(turnover, 3)//" J turned over"
+    text = "balance off by "//to_text(abs(off), 2)//" J; the sizes of its terms sum up to "//to_text(turnover, 3)//" J"
   end function energy_text
 
   !> What so many iterations would have taken. Collective.

@@ -1,11 +1,12 @@
-!> What the log says of events that a run ends before: insertions that begin and boundaries that are removed only after its end.
+!> What the log says of events that have their time: boundaries that are removed, and those that a run ends before, insertions that
+!> begin and boundaries that are removed only after its end.
 module gravier_late_events
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: late_warnings
+  public :: late_warnings, removal_lines
 
   character(len=*), parameter :: newline = new_line("a")
   !> part of a step that roundings of times take
@@ -54,5 +55,23 @@ contains
     end subroutine warn
 
   end subroutine late_warnings
+
+  !> The boundaries that were removed at the start of the last step, each a line ended by a newline.
+  function removal_lines(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    !> start of the last step [s]
+    real(dp) :: start
+    integer :: b
+
+    text = ""
+    start = simulation%time - (1.0_dp - rounded)*simulation%physics%h
+    do b = 1, size(simulation%decomposition%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(b))
+        if (boundary%remove_at > start .or. boundary%remove_at <= start - simulation%physics%h) cycle
+        text = text//"removed     boundary '"//boundary%name//"' at the start of step "//to_text(simulation%step)//newline
+      end associate
+    end do
+  end function removal_lines
 
 end module gravier_late_events

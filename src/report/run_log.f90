@@ -21,7 +21,7 @@ module gravier_run_log
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
-  use gravier_late_events, only: late_warnings
+  use gravier_late_events, only: late_warnings, removal_lines
   use gravier_rounding_lines, only: rounding_warnings
   use gravier_intact_bonds, only: count_bonds
   use gravier_run_tally, only: relative_error
@@ -218,8 +218,8 @@ contains
       & "energy [J]  wall [s]   remaining", error)
   end subroutine run_log_write_head
 
-  !> What the first solve starts from, where the bodies file gives contacts with forces, and how many bonds there are after the
-  !> first step. Collective.
+  !> Boundaries that were removed at the start of a step. After the first step, what its solve started from, where the bodies file
+  !> gives contacts with forces, and how many bonds there are. Collective.
   subroutine run_log_write_started(self, simulation, figures, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -227,6 +227,7 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     integer(i8) :: per_mille, bonds
 
+    call write_lines(self, removal_lines(simulation), "", error)
     if (simulation%step == 1 .and. simulation%physics%laws%breaks) then
       bonds = count_bonds(simulation%halo, simulation%decomposition, simulation%physics%laws)
       call self%line("bonds       "//to_text(bonds)//" after the first step", error)

@@ -141,7 +141,7 @@ contains
     end associate
   end function doubts_text
 
-  !> How the solves ended that missed their goal.
+  !> How the solves ended that missed their goal, and in which steps.
   function misses_text(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
@@ -153,6 +153,11 @@ contains
       call add(tally%unbounded, "found no solution")
       call add(tally%exhausted, "ended at max_iterations")
       call add(tally%diverged, "diverged")
+      if (tally%last_missed > tally%first_missed) then
+        text = text//", in steps "//to_text(tally%first_missed)//" to "//to_text(tally%last_missed)
+      else if (tally%first_missed > 0) then
+        text = text//", in step "//to_text(tally%first_missed)
+      end if
     end associate
     text = text(3:)
 

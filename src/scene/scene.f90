@@ -200,21 +200,23 @@ contains
     call comm%agree(error)
   end subroutine check_data
 
-  !> Glue the grains of a group to the boundary of that group. Errors are the same on all ranks. Collective.
+  !> Glue the grains of a group to the boundary of that group, which has some. Errors are the same on all ranks. Collective.
   subroutine glue(comm, config, data, scene, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
     type(scene_t), intent(inout) :: scene
     type(error_t), allocatable, intent(inout) :: error
-    integer :: k, b
+    integer :: k, b, members(size(config%boundaries))
 
     scene%n_glued = comm%total(int(count(data%group > 0), i8))
+    members(:) = 0
     do k = 1, data%n
       if (data%group(k) == 0) cycle
       do b = 1, size(config%boundaries)
-        if (config%boundaries(b)%shape == "grains" .and. config%boundaries(b)%group == data%group(k)) &
-          & scene%grains%glued(k) = data%n_walls + b
+        if (config%boundaries(b)%shape /= "grains" .or. config%boundaries(b)%group /= data%group(k)) cycle
+        scene%grains%glued(k) = data%n_walls + b
+        members(b) = members(b) + 1
       end do
       if (scene%grains%glued(k) > 0) cycle
       call raise(error, status_input, trim(config%scene%bodies_file)//": id "//to_text(data%id(k))//": group "// &
@@ -222,6 +224,12 @@ contains
       exit
     end do
     call comm%agree(error)
+    do b = 1, size(members)
+      if (config%boundaries(b)%shape /= "grains" .or. allocated(error)) cycle
+      if (comm%total(int(members(b), i8)) > 0) cycle
+      call raise(error, status_input, config%file//": &boundary '"//trim(config%boundaries(b)%name)//"': group = "// &
+        & to_text(config%boundaries(b)%group)//": "//trim(config%scene%bodies_file)//" has no grain of this group; expected some")
+    end do
   end subroutine glue
 
   !> Bodies with shapes turn, and no moments resist that: the arms of their contacts do.

@@ -61,7 +61,7 @@ class Fallback(RunTestCase):
 
     def assert_lost(self, run):
         self.assert_status(run, 3)
-        self.assertRegex(run.stdout, r"\nconverged   NO: .*; \d+ stagnated(, \d+ ended at max_iterations)?\n")
+        self.assertRegex(run.stdout, r"\nconverged   NO: .*; \d+ stagnated(, \d+ ended at max_iterations)?, in steps? \d+( to \d+)?\n")
         self.assertIn("\nto mend it  &solver fallback = 'newton' takes over solves that stagnate\n", run.stdout)
         self.assertNotIn("\nfallback  ", run.stdout)
 

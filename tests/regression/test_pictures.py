@@ -295,10 +295,12 @@ class Pictures(RunTestCase):
         plt.close(figure)
 
     def test_walls_that_turn(self):
-        """A segment that turns about its middle, and a cylinder whose axis does, are drawn as they lie."""
+        """A segment that turns about its middle, and a cylinder whose axis does, are drawn as they lie, and a gate up to the step before it goes."""
         flat = {"scene": {"bodies": "lattice", "lattice_count": [1, 1], "radius_min": 0.01, "radius_max": 0.01, "gravity": [0.0, 0.0]},
-                "boundary": [{"name": "bar", "shape": "segment", "point": [1.0, 1.0], "end": [3.0, 1.0], "pivot": [2.0, 1.0], "rotation": 1.0}],
-                "time": {"step": 1e-2, "steps": 100}, "output": {"directory": "results", "every": 100}}
+                "boundary": [{"name": "bar", "shape": "segment", "point": [1.0, 1.0], "end": [3.0, 1.0], "pivot": [2.0, 1.0], "rotation": 1.0},
+                             {"name": "gate", "shape": "plane", "point": [0.0, -1.0], "normal": [0.0, 1.0], "remove_at": 0.5},
+                             {"name": "none", "shape": "plane", "point": [0.0, -1.0], "normal": [0.0, 1.0], "remove_at": 0.0}],
+                "time": {"step": 1e-2, "steps": 100}, "output": {"directory": "results", "every": 10}}
         space = {"scene": {**flat["scene"], "dimension": 3, "lattice_count": [1, 1, 1], "gravity": [0.0, 0.0, 0.0]},
                  "boundary": [{"name": "drum", "shape": "cylinder", "point": [0.0, 0.0, 0.0], "axis": [0.0, 2.0, 0.0], "radius": 5.0, "rotation": [1.0, 0.0, 0.0]},
                               {"name": "plate", "shape": "rectangle", "point": [1.0, 0.0, 0.0], "edge_a": [2.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0],
@@ -310,6 +312,9 @@ class Pictures(RunTestCase):
             walls = picture_space.Walls(gravier.Run(self.here(name + "/results")), 100)
             if name == "bar":
                 np.testing.assert_allclose(list(walls.polygons()), [[[2.0, 1.0] - along, [2.0, 1.0] + along]], rtol=1e-9)
+                for step, there in ((0, True), (50, True), (60, False)):
+                    names = picture_space.Walls(gravier.Run(self.here(name + "/results")), step).rows.name.tolist()
+                    self.assertEqual(["gate" in names, "none" in names], [there, False])
             else:
                 np.testing.assert_allclose([axis for _, axis, _ in walls.cylinders()], [[0.0, *along]], atol=1e-9)
                 corners = np.array([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0], [3.0, *along], [1.0, *along]])
@@ -410,7 +415,7 @@ class Pictures(RunTestCase):
         np.testing.assert_array_equal(curves[2], [rows[2].stress[:, 0, 0], rows[2].stress[:, 1, 1], rows[2].stress[:, 0, 1]])
         np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), rows[2].centre[:, 1])
         plt.close(figure)
-        figure = curve_pictures.draw_profile(self.disks, "layers", "all", ["pressure"], True)
+        figure = curve_pictures.draw_profile(self.disks, "layers", None, ["pressure"], True)
         np.testing.assert_allclose(figure.axes[0].lines[0].get_xdata(), np.mean([row.pressure for row in rows], axis=0), rtol=1e-12)
         self.assertIn("step 50 to 150: mean of 3 states", figure._suptitle.get_text())
         plt.close(figure)

@@ -25,6 +25,7 @@ import gravier_plot  # noqa: E402
 import packing_picture  # noqa: E402
 import picture_style  # noqa: E402
 
+TIED = (("time", "step"), ("time", "steps"))
 GROUND = {"name": "it's the ground", "shape": "plane", "normal": [0.0, 1.0]}
 
 
@@ -211,15 +212,29 @@ class Package(RunTestCase):
             run = gravier.Run(place / "results")
             self.assertEqual((run.case["scene"][0]["friction"], run.steps[-1], status), (*point.values(), 0))
         self.assertEqual(base["scene"]["friction"], 0.3)
+        table = pathlib.Path(self.here("study/study.csv"))
+        self.assertEqual(table.read_text(), "run,status,scene.friction,time.steps\nrun_1,0,0.0,2\nrun_2,0,0.0,3\nrun_3,0,0.4,2\nrun_4,0,0.4,3\n")
         for ranks in (0, 1.5, math.nan, math.inf, "2", None):
             with self.assertRaisesRegex(gravier.CaseError, f"ranks = {ranks}: expected a whole number above 0"):
                 gravier.run(base, self.here("none"), ranks=ranks)
         for changes, words in (({("scene",): [0.1]}, r"\('scene',\): expected \(group, key\), or \(group, name, key\)"),
                                ({"scene": [0.1]}, r"'scene': expected \(group, key\), or"),
                                ({("scene", "friction"): 0.1}, r"\('scene', 'friction'\): 0.1; expected a list of values$"),
-                               ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$")):
+                               ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$"),
+                               ({TIED: [(1e-3, 2, 3)]}, r": \(0.001, 2, 3\); expected a value for each of these 2 keys$"),
+                               ({TIED: [1e-3]}, ": 0.001; expected a value for each of these 2 keys$"), ({(): [1]}, r"\(\): expected \(group, key\)")):
             with self.assertRaisesRegex(gravier.CaseError, words):
                 list(gravier.study(base, changes, self.here("none")))
+        # keys that change together; a table of another origin is nobody's to replace
+        for point, place, status in gravier.study(base, {TIED: [(1e-3, 2), (5e-4, 4)]}, self.here("tied")):
+            time = gravier.Run(place / "results").case["time"][0]
+            self.assertEqual((time["step"], time["steps"], status), (*point.values(), 0))
+        self.assertEqual(pathlib.Path(self.here("tied/study.csv")).read_text(), "run,status,time.step,time.steps\nrun_1,0,0.001,2\nrun_2,0,0.0005,4\n")
+        table.write_text("mine\n")
+        with self.assertRaisesRegex(gravier.CaseError, "study.csv: "):
+            list(gravier.study(base, {("time", "steps"): [2]}, self.here("study")))
+        self.assertEqual(table.read_text(), "mine\n")
+        table.unlink()
         # a group that stands once is a list of one in what parse_namelist returns
         parsed = {group: keys if isinstance(keys, list) else [keys] for group, keys in base.items()}
         for point, place, status in gravier.study(parsed, {("time", "steps"): [2]}, self.here("parsed")):

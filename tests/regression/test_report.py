@@ -163,13 +163,13 @@ class Report(RunTestCase):
         self.assertNotIn("sweeps            ", page.text["last-words"])
 
     def test_balance(self):
-        """A balance that is off by a part of the energy turned over is none."""
+        """A balance that is off by a part of its terms is none."""
         for off, grade in (("1.0E-13", "good"), ("1.0E-03", "doubt"), ("2.1E+00", "bad")):
-            (answer,) = verdict.balanced(RunLog(f"energy      balance off by {off} J, of 2.09E+00 J turned over\n"))
+            (answer,) = verdict.balanced(RunLog(f"energy      balance off by {off} J; the sizes of its terms sum up to 2.09E+00 J\n"))
             self.assertEqual(answer.grade, grade)
             self.assertNotIn("since", answer.text)
         self.assertEqual(verdict.balanced(RunLog("")), [])
-        (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J, of 1.0 J turned over\n"))
+        (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J; the sizes of its terms sum up to 1.0 J\n"))
         self.assertIn("since the last restart", answer.text)
 
     def test_projected(self):

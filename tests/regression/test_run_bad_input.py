@@ -444,6 +444,17 @@ class BadInput(RunTestCase):
             return "table.csv"
         self.refuse_all(TABLES, prepare_table)
 
+    def test_boundaries_without_grains(self):
+        """A lid of glued grains without one, as of a table that has forgotten its groups, flew away with its load in runs that had converged."""
+        def prepare_lid(directory, text):
+            write(os.path.join(directory, "bodies.csv"), text)
+            write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv", boundary=[
+                {"name": "lid", "shape": "grains", "group": 2, "free": [False, True], "mass": 1.0}, PLANE]))
+            return "case.nml"
+        words = ("case.nml: &boundary 'lid': group = 2: bodies.csv has no grain of this group; expected some",)
+        self.refuse_all([("no groups", "id,x,y,radius\n1,0,0,0.05\n2,0.3,0,0.05\n", words),
+                         ("no grain in it", "id,x,y,radius,group\n1,0,0,0.05,0\n2,0.3,0,0.05,0\n", words)], prepare_lid)
+
     def test_turning_glued_bodies(self):
         """Glued grains that turn and reach half round a periodic cell, in the rows of the second rank."""
         def prepare_turning(directory, period):

@@ -206,6 +206,10 @@ class Scales(RunTestCase):
                 "boundary": [{"name": "gate", "shape": "plane", "normal": [0.0, 1.0], "remove_at": 0.4}],
                 "insertion": {"name": "late", "lower": [0.0, 0.1], "upper": [0.1, 0.2], "radius": 0.01, "rate": 10.0, "start": 0.5}}
         lines = self.warnings(self.check_case(case))
+        for start, step in ((0.0, 1), (1e-3, 2), (1.5e-3, 3)):
+            run = run_case(merged(case, {"boundary": [{**case["boundary"][0], "remove_at": start}], "time": {"steps": 4}}), 1, self.here(f"removed {step}"))
+            self.assert_status(run, 0)
+            self.assertEqual(re.findall("\nremoved .*", run.stdout), [f"\nremoved     boundary 'gate' at the start of step {step}"])
         self.assertEqual(lines, ["warning     &insertion 'late': start = 5.00000E-01 s, and the run ends at 4.00000E-01 s, before grains enter",
                                  "warning     &boundary 'gate': remove_at = 4.00000E-01 s, and the run ends at 4.00000E-01 s, before it is removed"])
         self.assertEqual(self.warnings(self.check_case(case, {"time": {"steps": 501}})), [])

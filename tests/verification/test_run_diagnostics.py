@@ -152,7 +152,7 @@ class Diagnostics(RunTestCase):
 
     def balance_line(self, run):
         """What the log says that the balance of the grains is off by, and has turned over [J]."""
-        off, turned = re.search(r"energy +balance off by (\S+) J, of (\S+) J turned over", run.stdout).groups()
+        off, turned = re.search(r"energy +balance off by (\S+) J; the sizes of its terms sum up to (\S+) J", run.stdout).groups()
         return float(off), float(turned)
 
     def test_balance_of_every_run(self):

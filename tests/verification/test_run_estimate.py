@@ -99,7 +99,7 @@ class Lines(RunTestCase):
     def test_lines(self):
         """Without and with the terms of the energy balance."""
         run = run_case(merged(DISKS, {"time": {"steps": 60}, "solver": {"criterion": "residual"}}), directory=self.here("plain"))
-        balance = r"energy +balance off by (\S+) J, of (\S+) J turned over\n"
+        balance = r"energy +balance off by (\S+) J; the sizes of its terms sum up to (\S+) J\n"
         off, turned = re.search(balance, run.stdout).groups()
         self.assertLess(float(off), 1e-12 * float(turned))
         accuracy = re.search(r"accuracy    residual at most (\S+) at the end of a solve, tolerance ([^ ;]+); "

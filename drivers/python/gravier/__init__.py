@@ -8,13 +8,14 @@ needs numpy and h5py; `Table.frame()` needs pandas too.
 """
 from . import blocks
 from .arrays import StaleArray
-from .case import CaseError, entries, namelist, parse_namelist, run, study, value_text
+from .case import CaseError, entries, namelist, parse_namelist, run, value_text
 from .checksum import seal
 from .library import SimulationError
 from .restarts import write_bodies
 from .results import BodiesFile, Run
 from .shapes import Piece, Shape
 from .simulation import Simulation
+from .studies import study
 from .tables import ResultsError, Table, read_table
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",

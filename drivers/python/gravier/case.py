@@ -1,9 +1,7 @@
-"""Cases as dictionaries: input files written and read, runs of the program, studies of parameters."""
-import itertools
+"""Cases as dictionaries: input files written and read, runs of the program."""
 import os
 import re
 import subprocess
-import warnings
 from pathlib import Path
 
 import numpy as np
@@ -173,7 +171,7 @@ MADE, MADE_LOG = "! made by gravier.run\n", "made by gravier.run\n"
 EARLIER_LOGS = r"Gravier \d|gravier: error: "
 
 
-def _claim(path, kinds):
+def claim(path, kinds):
     """check_place, as an exception of this module."""
     try:
         check_place(path, kinds)
@@ -186,7 +184,7 @@ def write_case(groups, directory):
     it, or where it is the same case."""
     case, text = Path(directory) / "case.nml", namelist(groups)
     if not (case.is_file() and case.read_bytes() == text.encode()):
-        _claim(case, {".nml": MADE.encode()})
+        claim(case, {".nml": MADE.encode()})
     case.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(case) as part:
         part.write_text(MADE + text, encoding="utf-8")
@@ -212,7 +210,7 @@ def run(groups, directory, ranks=1, program=None):
 
 def run_alone(groups, directory, ranks, program):
     """What `run` does where no other one is under way."""
-    _claim(directory / "terminal.log", {".log": f"{MADE_LOG}|{EARLIER_LOGS}".encode()})
+    claim(directory / "terminal.log", {".log": f"{MADE_LOG}|{EARLIER_LOGS}".encode()})
     write_case(groups, directory)
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
@@ -225,44 +223,3 @@ def run_alone(groups, directory, ranks, program):
         lines = re.findall(r"^gravier: error: .*$", said, re.M) or said.strip().splitlines()[-1:]
         raise CaseError(f"{directory}: gravier ended with status {done.returncode}: {' '.join(lines)}")
     return done.returncode
-
-
-def study(base, changes, directory, ranks=1):
-    """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
-    `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
-    times is (group, name, key), with the `name` of the group, or its number from 1. Warns of runs that an older, larger study has left."""
-    for what, values in changes.items():
-        if not (isinstance(what, tuple) and len(what) in (2, 3)):
-            raise CaseError(f"{what!r}: expected (group, key), or (group, name, key) of a group that stands several times")
-        if isinstance(values, str) or not np.iterable(values):
-            raise CaseError(f"{what}: {values!r}; expected a list of values")
-    points = list(itertools.product(*changes.values()))
-    older = sorted(int(place.name[4:]) for place in Path(directory).glob("run_*") if place.name[4:].isdigit() and int(place.name[4:]) > len(points))
-    if older:
-        warnings.warn(f"{directory}: {', '.join(f'run_{number}' for number in older)} of an older study stay; this one has run_1 to run_{len(points)}",
-                      stacklevel=2)
-    for number, values in enumerate(points, 1):
-        point = dict(zip(changes, values))
-        groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
-        for what, value in point.items():
-            _group_of(groups, *what)[what[-1]] = value
-        place = Path(directory) / f"run_{number}"
-        yield point, place, run(groups, place, ranks)
-
-
-def _group_of(groups, group, *rest):
-    """The keys of a group, of one that stands several times by its name or number."""
-    found = groups.setdefault(group, {})
-    *which, key = rest
-    several = found if isinstance(found, list) else [found]
-    if which:
-        own = [one for number, one in enumerate(several, 1) if which[0] in (number, one.get("name"))]
-        if len(own) != 1:
-            known = ", ".join(repr(one.get("name", number)) for number, one in enumerate(several, 1))
-            raise CaseError(f"&{group} {which[0]!r}: {'no' if not own else 'more than one'} group of this name or number; expected one of {known}")
-        return own[0]
-    if len(several) == 1:
-        return several[0]
-    if isinstance(found, list):
-        raise CaseError(f"&{group} {key}: the group stands several times; expected ('{group}', name, '{key}'), with the name or number of one of them")
-    return found

@@ -66,6 +66,7 @@ module gravier_test_impulses
     procedure :: begin_anew => test_impulses_begin_anew
     procedure :: take_earlier => test_impulses_take_earlier
     procedure :: project => test_impulses_project
+    procedure :: changing_mass => test_impulses_changing_mass
     procedure, private :: has_copy => test_impulses_has_copy
   end type test_impulses_t
 
@@ -189,6 +190,28 @@ contains
     found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:n_sums))
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
+
+  !> Mass of the grains that the last iteration has moved by more than `velocity`, or that violations of contacts would move by more,
+  !> after `project` [kg]. Collective.
+  real(dp) function test_impulses_changing_mass(self, problem, velocity) result(mass)
+    class(test_impulses_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    !> [m/s]
+    real(dp), intent(in) :: velocity
+    real(dp) :: parts(size(problem%sub)), moved
+    integer :: s, b
+
+    parts(:) = 0.0_dp
+    do s = 1, size(problem%sub)
+      associate (sub => problem%sub(s), part => self%part(s), nd => problem%kernels%nd)
+        do b = 1, sub%n_grains
+          moved = sub%inverse_mass(1, b)*max(norm2(part%recent(1:nd, b)), norm2(part%local(1:nd, b)))
+          if (moved > velocity) parts(s) = parts(s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+        end do
+      end associate
+    end do
+    mass = problem%comm%sum_real(parts)
+  end function test_impulses_changing_mass
 
   !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
   subroutine make_room(part, problem, sub, power)

@@ -11,7 +11,8 @@
 !>      at rest. The estimate is the smaller of E and C, and C where that is below a tenth of the error allowed.
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
 !> law by much, and no body sink by much onto what is below it. Where nearly all bodies are at rest and some are faster, these may
-!> roll or be in error: E has to be at most a third of what moves there. See doc/theory.md, section 24.
+!> roll or be in error: E has to be at most a third of what moves there. Where few grains still change, the others say nothing of
+!> their errors, and E has to be smaller. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_body_mass, only: inverse_of_translation, are_uneven
@@ -42,6 +43,9 @@ module gravier_velocity_error
   real(dp), parameter :: rounding = 1.0e-13_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
+  !> A grain still changes where an iteration moves it by more than this share of the error allowed. Where the grains that do have a
+  !> small part of the mass, the others say nothing of their errors: E is divided by the root of this part, at least by this.
+  real(dp), parameter :: still_changes = 1.0e-4_dp, least_root = 0.1_dp
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
 
@@ -70,6 +74,9 @@ module gravier_velocity_error
     !> waves cannot have crossed all bodies yet; the same of what a boundary moves through bonds. Iterations made at the last
     !> `assess`, and before the last `begin_anew`.
     logical, private :: is_early = .false.
+    !> root of the part of the mass that still changes, at least `least_root`; 1 where nothing changes, or as long as it is not asked
+    !> for
+    real(dp), private :: root_of_changing = 1.0_dp
     !> the iteration from which on E is believed of what a boundary moves through bonds, 0 where it is now
     integer :: believed_from = 0
     integer, private :: iterations = 0, begun_at = 0
@@ -156,6 +163,7 @@ contains
     self%is_restless = .false.
     self%is_early = .false.
     self%believed_from = 0
+    self%root_of_changing = 1.0_dp
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -198,6 +206,8 @@ contains
       & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
     if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%levels%fastest/sinking_allowed)
     if (self%has_followed) criterion = max(criterion, error_of_bodies(self))
+    if (self%root_of_changing < 1.0_dp) criterion = max(criterion, &
+      & min(self%bound_by_rest, self%wave(weight_of_levels))/self%root_of_changing)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
     ! what is reported then is the bound by rest, which has to be within the error allowed, too
@@ -272,7 +282,10 @@ contains
     real(dp) :: limit
     !> iterations before which E is not believed: waves go down once after a pass, and down and up where bodies hold by traction
     integer :: early
+    !> of the grains that still change [kg]
+    real(dp) :: mass
 
+    mass = 0.0_dp
     call self%levels%add(problem, self%mass, self%largest_violation)
     self%has_levels = .true.
     self%has_followed = .false.
@@ -281,6 +294,10 @@ contains
     if (problem%attracts) early = self%begun_at + 2*self%levels%most_depth
     self%is_early = self%iterations < early .and. (problem%carries .or. self%bound_by_rest <= slow*problem%error_scale)
     self%believed_from = merge(early, 0, self%is_early .and. problem%carries)
+    if (self%criterion() > self%allowed) return
+    if (self%mass > 0.0_dp .and. self%bound_by_rest > self%most_at_rest) &
+      & mass = self%tests%changing_mass(problem, still_changes*self%allowed)
+    if (mass > 0.0_dp) self%root_of_changing = min(1.0_dp, max(least_root, sqrt(mass/self%mass)))
     if (self%criterion() > self%allowed) return
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then

@@ -23,6 +23,8 @@ module gravier_run_tally
   type :: run_tally_t
     !> solves, and how those that missed the criterion ended
     integer(i8) :: solves = 0, stagnated = 0, unbounded = 0, exhausted = 0, diverged = 0
+    !> first and last step whose solve missed it; 0: none
+    integer :: first_missed = 0, last_missed = 0
     !> solves that reached another criterion than the velocity error: those that missed the accuracy, those that ended too soon to
     !> tell
     integer(i8) :: inaccurate = 0, unjudged = 0
@@ -75,14 +77,20 @@ contains
     if (solve%velocity_scale > 0.0_dp) relative_error = solve%velocity_error/solve%velocity_scale
   end function relative_error
 
-  !> Add a solve.
-  pure subroutine run_tally_add_solve(self, solve, kind)
+  !> Add the solve of a step.
+  pure subroutine run_tally_add_solve(self, solve, kind, step)
     class(run_tally_t), intent(inout) :: self
     type(solve_report_t), intent(in) :: solve
     !> of its velocity scale
     character(len=*), intent(in) :: kind
+    !> its number, from 1
+    integer, intent(in) :: step
 
     self%solves = self%solves + 1
+    if (solve%status /= solve_converged) then
+      if (self%first_missed == 0) self%first_missed = step
+      self%last_missed = step
+    end if
     select case (solve%status)
     case (solve_converged)
       if (.not. solve%judged) then

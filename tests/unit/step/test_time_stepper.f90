@@ -224,29 +224,32 @@ contains
     solve%velocity_error = 0.02_dp
     solve%velocity_scale = 0.1_dp
     solve%residual = 2e-2_dp
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 1)
     ! reached another criterion: out of the accuracy, then too soon to tell, twice
     solve%accurate = .false.
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 2)
     solve%judged = .false.
-    call tally%add_solve(solve, "load of a step")
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 3)
+    call tally%add_solve(solve, "load of a step", 4)
     ! a pass over layers that the solve went on from, then one that it did not
     solve%layered_sweeps = 1.5_dp
     solve%layered = .true.
     solve%status = solve_stagnated
     solve%velocity_error = 0.06_dp
     solve%residual = 1e-2_dp
-    call tally%add_solve(solve, "load of a step")
+    call tally%add_solve(solve, "load of a step", 5)
     solve%layered = .false.
     solve%status = solve_diverged
     solve%velocity_error = 1e9_dp
     solve%velocity_scale = 0.4_dp
-    call tally%add_solve(solve, "speeds")
+    call check_equal(tally%last_missed, 5, "last step that missed so far")
+    call tally%add_solve(solve, "speeds", 6)
     call check_equal(int(tally%solves), 6, "solves")
     call check_equal(int(tally%inaccurate), 1, "out of the accuracy")
     call check_equal(int(tally%unjudged), 2, "ended too soon to tell")
     call check_equal(int(tally%missed()), 2, "missed")
+    call check_equal(tally%first_missed, 5, "first step that missed")
+    call check_equal(tally%last_missed, 6, "last step that missed")
     call check_equal(int(tally%tried_layers), 2, "passes over layers that were tried")
     call check_equal(int(tally%took_layers), 1, "and gone on from")
     call check_close(tally%layered_sweeps, 3.0_dp, 0.0_dp, "sweeps of both")

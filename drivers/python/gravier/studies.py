@@ -1,0 +1,83 @@
+"""Studies of parameters: a case with several values of its keys, a run each."""
+import csv
+import itertools
+import warnings
+from pathlib import Path
+
+import numpy as np
+from whole_file import whole_file
+
+from .case import CaseError, claim, run, value_text
+
+#: what the table of a study begins with
+HEADER = ("run", "status")
+
+
+def study(base, changes, directory, ranks=1):
+    """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
+    `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
+    times is (group, name, key), with the `name` of the group, or its number from 1. Keys that change together are a tuple of such keys, whose
+    values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row a run: its
+    directory, its exit status and its values. Warns of runs that an older, larger study has left."""
+    points = _points(changes)
+    directory = Path(directory)
+    claim(directory / "study.csv", {".csv": ",".join(HEADER).encode()})
+    older = sorted(int(place.name[4:]) for place in directory.glob("run_*") if place.name[4:].isdigit() and int(place.name[4:]) > len(points))
+    if older:
+        warnings.warn(f"{directory}: {', '.join(f'run_{number}' for number in older)} of an older study stay; this one has run_1 to run_{len(points)}",
+                      stacklevel=2)
+    rows = []
+    for number, point in enumerate(points, 1):
+        groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
+        for what, value in point.items():
+            _group_of(groups, *what)[what[-1]] = value
+        place = directory / f"run_{number}"
+        status = run(groups, place, ranks)
+        rows.append([place.name, status, *(value_text(value) for value in point.values())])
+        _write_table(directory / "study.csv", point, rows)
+        yield point, place, status
+
+
+def _points(changes):
+    """Values of the keys of each run, {(group, key): value}."""
+    series = []
+    for what, values in changes.items():
+        tied = isinstance(what, tuple) and what and all(isinstance(one, tuple) for one in what)
+        keys = what if tied else (what,)
+        for one in keys:
+            if not (isinstance(one, tuple) and len(one) in (2, 3)):
+                raise CaseError(f"{one!r}: expected (group, key), or (group, name, key) of a group that stands several times")
+        if isinstance(values, str) or not np.iterable(values):
+            raise CaseError(f"{what}: {values!r}; expected a list of values")
+        several = list(values) if tied else [(value,) for value in values]
+        for value in several:
+            if isinstance(value, str) or not np.iterable(value) or len(value) != len(keys):
+                raise CaseError(f"{what}: {value!r}; expected a value for each of these {len(keys)} keys")
+        series.append([dict(zip(keys, value)) for value in several])
+    return [{key: value for part in parts for key, value in part.items()} for parts in itertools.product(*series)]
+
+
+def _write_table(path, point, rows):
+    """The runs that are over, in the place of those known before."""
+    with whole_file(path) as part, open(part, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([*HEADER, *(".".join(str(part) for part in key) for key in point)])
+        writer.writerows(rows)
+
+
+def _group_of(groups, group, *rest):
+    """The keys of a group, of one that stands several times by its name or number."""
+    found = groups.setdefault(group, {})
+    *which, key = rest
+    several = found if isinstance(found, list) else [found]
+    if which:
+        own = [one for number, one in enumerate(several, 1) if which[0] in (number, one.get("name"))]
+        if len(own) != 1:
+            known = ", ".join(repr(one.get("name", number)) for number, one in enumerate(several, 1))
+            raise CaseError(f"&{group} {which[0]!r}: {'no' if not own else 'more than one'} group of this name or number; expected one of {known}")
+        return own[0]
+    if len(several) == 1:
+        return several[0]
+    if isinstance(found, list):
+        raise CaseError(f"&{group} {key}: the group stands several times; expected ('{group}', name, '{key}'), with the name or number of one of them")
+    return found
