@@ -93,7 +93,8 @@ def projected(log, history):
     if depth and answer.grade != BAD and float(depth[1]) > SHALLOW:
         deep = float(depth[1]) > DEEP
         return Answer(answer.question, BAD if deep else max(answer.grade, DOUBT, key=[GOOD, DOUBT, BAD, UNKNOWN].index),
-                      f"{answer.text} It is {'deep' if deep else 'more than is usual'}: {depth[1]} of {depth[2]}.")
+                      f"{answer.text} It is {'deep' if deep else 'more than is usual'}: {depth[1]} of {depth[2]}. "
+                      f"{'Take a smaller step.' if deep else 'Half of the step shows whether the results depend on it.'}")
     return answer
 
 
@@ -151,7 +152,7 @@ def too_fast(history):
 
 def balanced(log):
     said = log.value("energy")
-    found = re.match(r"balance off by (\S+) J; the sizes of its terms sum up to (\S+) J", said)
+    found = re.match(r"balance off by (\S+) J(?:; the sizes of its terms sum up to|, of) (\S+) J", said)
     if not found:
         return []
     off, terms = (float(text) for text in found.groups())

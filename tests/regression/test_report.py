@@ -205,6 +205,9 @@ class Report(RunTestCase):
                                               "            no step projected overlaps\n"), history)
             self.assertEqual(answer.grade, grade, answer.text)
             self.assertEqual(f"{depth} of the mean radius" in answer.text, grade != "good")
+            self.assertEqual(answer.text.rsplit(": ", 1)[-1] if grade != "good" else "", {
+                "good": "", "doubt": f"{depth} of the mean radius. Half of the step shows whether the results depend on it.",
+                "bad": f"{depth} of the mean radius. Take a smaller step."}[grade])
 
     def test_drift(self):
         """Motion below the errors of solves casts doubt on an accuracy that was reached."""

@@ -13,10 +13,11 @@ from .checksum import seal
 from .library import SimulationError
 from .restarts import write_bodies
 from .results import BodiesFile, Run
+from .rough_walls import rough_walls
 from .shapes import Piece, Shape
 from .simulation import Simulation
 from .studies import study
 from .tables import ResultsError, Table, read_table
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "entries", "namelist", "parse_namelist", "read_table", "run", "seal", "study", "value_text", "write_bodies"]
+           "entries", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text", "write_bodies"]
