@@ -37,7 +37,7 @@ class ShapeBalances(RunTestCase):
         turnover = sum(np.abs(history[name]) for name in TERMS)
         steps = history["step"]
         np.testing.assert_array_less(np.abs(history["energy_error"]), 8 * np.finfo(float).eps * (steps + 10) * turnover)
-        off, turned = (float(number) for number in re.search(r"energy +balance off by (\S+) J, of (\S+) J", run.stdout).groups())
+        off, turned = (float(number) for number in re.search(r"energy +balance off by (\S+) J; the sizes of its terms sum up to (\S+) J", run.stdout).groups())
         self.assertLess(off, 8 * np.finfo(float).eps * (steps[-1] + 10) * turned)
         self.assertGreater(history["dissipated_normal"][-1] + history["dissipated_friction"][-1], 1e-3 * turnover[-1])
         return history

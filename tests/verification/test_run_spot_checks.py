@@ -11,7 +11,7 @@ from gravier import parse_namelist
 SETTLING = {
     "scene": {"dimension": 2, "bodies": "lattice", "lattice_count": [12, 10], "radius_min": 0.008, "radius_max": 0.012,
               "friction": 0.3, "alert_distance": 0.003},
-    "time": {"step": 1e-3, "steps": 400},
+    "time": {"step": 1e-3, "steps": 800},
     "decomposition": {"subdomains": 4},
     "solver": {"method": "schwarz"},
     "output": {"directory": "results", "every": 200},
