@@ -5,7 +5,6 @@ comparison adds a row (case, quantity, accepted, measured, error, tolerance) to 
 import functools
 import os
 
-import h5py
 import numpy as np
 
 from gravier_runs import RunTestCase, merged, run_case, write
@@ -45,30 +44,27 @@ class Record:
 
     def __init__(self, run, grains, dimension):
         self.run, self.dimension = run, dimension
-        with h5py.File(run.path("results", "results.h5")) as file:
-            numbers = sorted(int(name) for name in file["steps"])
-            states = [file[f"steps/{number}"] for number in numbers]
-            self.step = np.array(numbers)
-            self.time = np.array([state.attrs["time"] for state in states])
-            bodies = [state["bodies"] for state in states]
-            self.present = [one["id"][:] for one in bodies]
-            shape = (len(states), len(grains))
-            self.position = np.full(shape + (dimension,), np.nan)
-            self.all_velocities = np.full(shape + (3 * dimension - 3,), np.nan)
-            self.image = np.zeros(shape + (dimension,), dtype=int)
-            for k, (one, ids) in enumerate(zip(bodies, self.present)):
-                self.position[k, ids - 1] = one["position"]
-                self.all_velocities[k, ids - 1] = one["velocity"]
-                if "image" in one:
-                    self.image[k, ids - 1] = one["image"]
+        self.results = results = run.results()
+        numbers = results.steps()
+        self.step = np.array(numbers)
+        self.time = np.array([results[f"/steps/{number}@time"].item() for number in numbers])
+        self.present = results.of_steps("bodies/id")
+        shape = (len(numbers), len(grains))
+        self.position = np.full(shape + (dimension,), np.nan)
+        self.all_velocities = np.full(shape + (3 * dimension - 3,), np.nan)
+        self.image = np.zeros(shape + (dimension,), dtype=int)
+        for array, name in ((self.position, "position"), (self.all_velocities, "velocity"), (self.image, "image")):
+            for one, ids, values in zip(array, self.present, results.of_steps(f"bodies/{name}", name != "image")):
+                if values is not None:
+                    one[ids - 1] = values
         self.velocity = self.all_velocities[:, :, :dimension]
         self.spin = self.all_velocities[:, :, dimension:]
 
     def read(self, group, *names):
         """Of each state {name: array} of a group, all or the ones named; None where the run wrote no such group."""
-        with h5py.File(self.run.path("results", "results.h5")) as file:
-            groups = [file[f"steps/{number}"].get(group) for number in self.step]
-            return [None if one is None else {name: one[name][:] for name in names or one} for one in groups]
+        places = [f"/steps/{number}/{group}" for number in self.step]
+        return [{name: self.results[f"{place}/{name}"] for name in names or self.results.names(place)} if place in self.results else None
+                for place in places]
 
     @functools.cached_property
     def contacts(self):
