@@ -46,7 +46,7 @@ ENVIRONMENT = {
     "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1",
     # messages within one machine; a search for networks would take longer than most runs
-    "OMPI_MCA_pml": "ob1",
+    "OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "vader,self",
     # ranks are not bound to processors, whose caches and distances would take half of the start of a program to find out
     "HWLOC_COMPONENTS": "no_os,stop",
     # after a rank that failed the launcher would wait seconds for ranks that have left

@@ -47,6 +47,11 @@ class Results(collections.abc.Mapping):
         """Numbers of the steps whose states it holds, in ascending order."""
         return sorted(int(name) for name in self.names("/steps"))
 
+    def arrays(self):
+        """All but attributes, in half the time."""
+        _collect(self._file, "", self._known, False)
+        return {name: value for name, value in self._known.items() if "@" not in name and name[0] == "/"}
+
     def names(self, path):
         """What is in a group; nothing where there is no such group."""
         return [name.decode() for name in h5py.h5g.open(self._file, path.encode())] if path in self else []
@@ -65,18 +70,18 @@ class Results(collections.abc.Mapping):
         return found
 
 
-def _collect(group, path, found):
+def _collect(group, path, found, attributes=True):
     """Put all below a group into `found`, by the library's own calls, in half the time that h5py's objects take."""
     for k in range(group.get_num_objs()):
         name = group.get_objname_by_idx(k)
         place = f"{path}/{name.decode()}"
         node = h5py.h5o.open(group, name)
-        for number in range(h5py.h5a.get_num_attrs(node)):
+        for number in range(h5py.h5a.get_num_attrs(node) if attributes else 0):
             attribute = h5py.h5a.open(node, index=number)
             found[f"{place}@{attribute.name.decode()}"] = _attribute(node, attribute)
         found[place] = _value(node)
         if isinstance(node, h5py.h5g.GroupID):
-            _collect(node, place, found)
+            _collect(node, place, found, attributes)
 
 
 def _attribute(node, attribute):
