@@ -18,6 +18,7 @@ import unittest
 
 import numpy as np
 
+from forked_scripts import script
 from results_contents import Results, contents, steps_of  # noqa: F401
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
@@ -280,5 +281,4 @@ class StudyTestCase(RunTestCase):
 
     def run_study(self, *arguments):
         environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, self.study, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        return script(self.study, *arguments, directory=self.scratch, environment=environment)
