@@ -43,8 +43,8 @@ def read(path):
 class Studies(RunTestCase):
 
     def study(self, title, case, study, *others, ranks=1, files=(), status=0, drawn=False):
-        """Make a study of `case` in a directory of its own; its run and tables. Figures, which take longer than most studies, are drawn where they are
-        looked at."""
+        """Make a study of `case` in a directory of its own; its run and tables. Figures, which take longer than most studies, are drawn
+        where they are looked at."""
         directory = self.here(title)
         os.makedirs(directory, exist_ok=True)
         for name, text in dict(files).items():
@@ -138,7 +138,8 @@ class Columns(Studies):
     def test_exact_column(self):
         """At rest a column does not move: the error of positions is how far it sinks, that of the impulses is known."""
         run, rows, _ = self.study("exact", COLUMN_CASE, {"kind": "run", "vary": "tolerance", "values": "1e-2, 1e-4, 1e-6",
-                                                         "reference": "exact"}, "&variant name = 'NLGS', criterion = 'residual' /", drawn=True)
+                                                         "reference": "exact"},
+                                  "&variant name = 'NLGS', criterion = 'residual' /", drawn=True)
         for error in ("position_error", "force_error"):
             errors = [float(row[error]) for row in rows]
             self.assertTrue(errors[0] > 10 * errors[1] > 100 * errors[2] > 0.0, errors)

@@ -21,7 +21,8 @@ class ImportForces(RunTestCase):
         folder = os.path.join(self.scratch, f"run{len(os.listdir(self.scratch))}")
         os.mkdir(folder)
         with alone_environment() as environment:
-            done = script(IMPORT, box, "--step", "1e-3", "--steps", "1", "--out", "case", *options, directory=folder, environment=environment)
+            done = script(IMPORT, box, "--step", "1e-3", "--steps", "1", "--out", "case", *options, directory=folder,
+                          environment=environment)
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return folder, done.stderr
 

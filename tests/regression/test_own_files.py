@@ -57,7 +57,8 @@ class OwnFiles(RunTestCase):
 
     def tool(self, name, out):
         path, *arguments = TOOLS[name]
-        return script(os.path.join(SOURCE, "drivers", path), *arguments, out, directory=self.work, environment={**ENVIRONMENT, **os.environ})
+        return script(os.path.join(SOURCE, "drivers", path), *arguments, out, directory=self.work,
+                      environment={**ENVIRONMENT, **os.environ})
 
     def files(self):
         """What is in each file below the directory."""

@@ -133,14 +133,14 @@ class Report(RunTestCase):
         return status, said.getvalue()
 
     def page_of(self, directory, drawn=True):
-        """The page of a run; it loads nothing, and each picture is one, with words for who does not see it. Pictures that are the same as of another
-        run need not be drawn, which takes nine tenths of the time."""
+        """The page of a run; it loads nothing, and each picture is one, with words for who does not see it. Pictures that are the same
+        as of another run need not be drawn, which takes nine tenths of the time."""
         place = os.path.dirname(directory) if os.path.basename(directory) == "results" else directory
         out = self.here(f"{os.path.basename(place)}.html")
         with contextlib.ExitStack() as instead:
             if not drawn:
                 instead.enter_context(unittest.mock.patch.object(figures, "picture", undrawn))
-                instead.enter_context(unittest.mock.patch.object(figures, "draw_panels", lambda panels, width, height: plt.figure()))
+                instead.enter_context(unittest.mock.patch.object(figures, "draw_panels", lambda *_, **__: plt.figure()))
             status, said = self.report(directory, "-o", out)
         self.assertEqual((status, said), (0, out + "\n"))
         with open(out, encoding="utf-8") as file:

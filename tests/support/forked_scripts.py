@@ -1,5 +1,5 @@
-"""Scripts of Python that run as copies of the program that tests them, which has their modules already: to load h5py, numpy and matplotlib anew
-takes a quarter of a second to a whole one, and most scripts take little beside it."""
+"""Scripts of Python that run as copies of the program that tests them, which has their modules already: to load h5py, numpy and
+matplotlib anew takes a quarter of a second to a whole one, and most scripts take little beside it."""
 import ast
 import contextlib
 import io
@@ -24,7 +24,8 @@ with socket.socket(socket.AF_UNIX) as server:
 
 
 def script(path, *arguments, directory=".", environment=None):
-    """What `python3 PATH ARGUMENTS` does in a directory, as subprocess.run with texts has it; with `environment` beside that of this program."""
+    """What `python3 PATH ARGUMENTS` does in a directory, as subprocess.run with texts has it; with `environment` beside that of this
+    program."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err, open(os.devnull, "rb") as nothing:
         status = _copy(path, [str(argument) for argument in arguments], directory, {**os.environ, **(environment or {})},
                        [file.fileno() for file in (nothing, out, err)])

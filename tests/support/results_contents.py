@@ -14,7 +14,8 @@ def contents(path):
 
 
 class Results(collections.abc.Mapping):
-    """A file as it is now. What is asked for by its name is read alone, in a tenth of the time that all takes; all is read where names are listed."""
+    """A file as it is now. What is asked for by its name is read alone, in a tenth of the time that all takes; all is read where names
+    are listed."""
 
     def __init__(self, path):
         # a copy: the file itself may be written to by the next run in its directory

@@ -63,8 +63,8 @@ class Record:
     def read(self, group, *names):
         """Of each state {name: array} of a group, all or the ones named; None where the run wrote no such group."""
         places = [f"/steps/{number}/{group}" for number in self.step]
-        return [{name: self.results[f"{place}/{name}"] for name in names or self.results.names(place)} if place in self.results else None
-                for place in places]
+        return [{name: self.results[f"{place}/{name}"] for name in names or self.results.names(place)}
+                if place in self.results else None for place in places]
 
     @functools.cached_property
     def contacts(self):

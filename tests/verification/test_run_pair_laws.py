@@ -270,7 +270,8 @@ class Bridges(SmallScene):
         for near in (0.0, 0.004):
             bridge = law("a", "capillary", capillarity=capillarity, decay_length=decay, debonding_distance=0.005,
                          **({"bridge_distance": near} if near else {}))
-            record = self.play(f"bridges at the start {near}", grains, [], steps=17, material=named("a"), law=[bridge], output={"contacts": True})
+            record = self.play(f"bridges at the start {near}", grains, [], steps=17, material=named("a"), law=[bridge],
+                               output={"contacts": True})
             contacts = record.contacts[1]
             found = {(first, second): -impulse / self.step for first, second, impulse in
                      zip(contacts["candidate"], contacts["antagonist"], contacts["impulse"][:, 0])}
