@@ -12,6 +12,9 @@ import sys
 import tempfile
 import traceback
 
+TREE = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+#: what begins the places of modules of tests and of tools
+OURS = (os.path.join(TREE, "tests"), os.path.join(TREE, "drivers"))
 #: a program that hands its call to a server, with its environment and its three files, and ends as the script does
 CALL = """#!{python} -IS
 import os, socket, sys
@@ -100,7 +103,10 @@ def _run(path, arguments, directory, environment, files):
             os.dup2(file, number)
         sys.stdin, sys.stdout, sys.stderr = (io.TextIOWrapper(os.fdopen(number, mode), line_buffering=number == 2)
                                              for number, mode in enumerate(("rb", "wb", "wb")))
-        sys.argv, sys.path[0] = [path, *arguments], os.path.dirname(os.path.realpath(path))
+        sys.argv = [path, *arguments]
+        # where the script would look for modules: not where the test does
+        named = [place for place in environment.get("PYTHONPATH", "").split(os.pathsep) if place]
+        sys.path[:] = [os.path.dirname(os.path.realpath(path)), *named, *(place for place in sys.path if not place.startswith(OURS))]
         runpy.run_path(path, run_name="__main__")
         status = 0
     except SystemExit as end:
