@@ -21,7 +21,7 @@ set(gravier_test_environment
   OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
   OMPI_MCA_btl_vader_single_copy_mechanism=none
   # messages within one machine; a search for networks would take longer than most tests
-  OMPI_MCA_pml=ob1
+  OMPI_MCA_pml=ob1 OMPI_MCA_btl=vader,self
   # ranks are not bound to processors, whose caches and distances would take half of the start of a program to find out
   HWLOC_COMPONENTS=no_os,stop
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1

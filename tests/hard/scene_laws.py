@@ -240,7 +240,7 @@ def kinetic(contacts, scene, velocity):
 def check_numbers(run):
     """Complaints about what is not a finite number in any file."""
     wrong = []
-    for name, value in run.results().items():
+    for name, value in run.results().arrays().items():
         if np.asarray(value).dtype.kind == "f" and not np.all(np.isfinite(value)):
             wrong.append(f"{name} is not finite")
     for name in ("history.csv", "run.log"):

@@ -6,7 +6,7 @@ import subprocess
 import time
 import unittest
 
-from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, gravier, merged, namelist, run_case, write
+from gravier_runs import PROGRAMS, RunTestCase, alone_environment, gravier, merged, namelist, run_case, write
 
 #: grains of one radius on a lattice touch each other; of two radii most touch none
 TOUCHING, LOOSE = {"radius_min": 0.01, "radius_max": 0.01}, {"radius_min": 0.008, "radius_max": 0.012}
@@ -60,8 +60,9 @@ class Memory(RunTestCase):
         """[bytes] that gravier_sample held for so many grains."""
         self.write_sample(count, dimension, arrangement, radii)
         held = 0
-        with subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env={**ENVIRONMENT, **os.environ},
-                              stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
+        with alone_environment() as environment, \
+                subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env=environment,
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
             # ru_maxrss would have the memory of this process, too, of which the program is a child
             while program.poll() is None:
                 with open(f"/proc/{program.pid}/status", encoding="ascii") as status:
@@ -74,8 +75,9 @@ class Memory(RunTestCase):
     def sample_least(self, *kind):
         """[bytes] of a grain that gravier_sample refuses by."""
         self.write_sample(2 * 10**9, *kind)
-        run = subprocess.run(["sh", "-c", f"ulimit -v 6000000; exec {PROGRAMS}/gravier_sample sample.nml"], cwd=self.scratch,
-                             env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        with alone_environment() as environment:
+            run = subprocess.run(["sh", "-c", f"ulimit -v 6000000; exec {PROGRAMS}/gravier_sample sample.nml"], cwd=self.scratch,
+                                 env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         self.assertEqual(run.returncode, 4, run)
         return float(re.search(r"2000000000 grains: at least ([\d.]+) GB of memory are needed", run.stderr)[1]) / 2
 

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import shutil
+import unittest.mock
 
 import numpy as np
 
@@ -41,8 +42,9 @@ def read(path):
 
 class Studies(RunTestCase):
 
-    def study(self, title, case, study, *others, ranks=1, files=(), status=0):
-        """Make a study of `case` in a directory of its own; its run and tables."""
+    def study(self, title, case, study, *others, ranks=1, files=(), status=0, drawn=False):
+        """Make a study of `case` in a directory of its own; its run and tables. Figures, which take longer than most studies, are drawn
+        where they are looked at."""
         directory = self.here(title)
         os.makedirs(directory, exist_ok=True)
         for name, text in dict(files).items():
@@ -53,7 +55,8 @@ class Studies(RunTestCase):
         if isinstance(values, str):
             text = text.replace("'" + values + "'", values)
         write(os.path.join(directory, "study.nml"), text + "\n".join(others))
-        run = gravier("study.nml", ranks=ranks, directory=directory, program="gravier_accuracy")
+        with unittest.mock.patch.dict(os.environ, {} if drawn else {"GRAVIER_PYTHON": "true"}):
+            run = gravier("study.nml", ranks=ranks, directory=directory, program="gravier_accuracy")
         self.assert_status(run, status)
         if status == 2:
             return run, None, None
@@ -73,7 +76,7 @@ class BouncingBall(Studies):
         run, rows, summary = self.study("ball", BALL_CASE, {"kind": "run", "vary": "step", "values": steps, "reference": "exact",
                                                             "samples": 50},
                                         "&variant name = 'half', theta = 0.5 /", "&variant name = 'one', theta = 1.0 /",
-                                        files={"ball.csv": BALL})
+                                        files={"ball.csv": BALL}, drawn=True)
         orders = {row["variant"]: float(row["value"]) for row in summary if row["figure"] == "order_position"}
         self.assertEqual(sorted(orders), ["half", "one"])
         for variant, order in orders.items():
@@ -114,7 +117,7 @@ class Columns(Studies):
     def test_solve(self):
         """One row a check; iterations as gravier's own trace has them."""
         run, rows, summary = self.study("solve", COLUMN_CASE, {"kind": "solve", "repeats": 3}, "&variant name = 'NLGS' /",
-                                        "&variant name = 'NSCDD', method = 'nscdd', grid = 1, 2 /")
+                                        "&variant name = 'NSCDD', method = 'nscdd', grid = 1, 2 /", drawn=True)
         trace = run_case(merged(COLUMN_CASE, {"output": {"trace": True}}), directory=self.here("trace")).trace()
         nlgs = [row for row in rows if row["variant"] == "NLGS"]
         self.assertEqual([int(row["iteration"]) for row in nlgs], list(trace["iteration"]))
@@ -135,7 +138,8 @@ class Columns(Studies):
     def test_exact_column(self):
         """At rest a column does not move: the error of positions is how far it sinks, that of the impulses is known."""
         run, rows, _ = self.study("exact", COLUMN_CASE, {"kind": "run", "vary": "tolerance", "values": "1e-2, 1e-4, 1e-6",
-                                                         "reference": "exact"}, "&variant name = 'NLGS', criterion = 'residual' /")
+                                                         "reference": "exact"},
+                                  "&variant name = 'NLGS', criterion = 'residual' /", drawn=True)
         for error in ("position_error", "force_error"):
             errors = [float(row[error]) for row in rows]
             self.assertTrue(errors[0] > 10 * errors[1] > 100 * errors[2] > 0.0, errors)
@@ -180,7 +184,7 @@ class Packing(Studies):
 
     def test_errors_and_knee(self):
         """Errors are those of the states that gravier writes; the knee is what the table says."""
-        run, rows, summary = self.study("packing", DISKS, self.ASKED, *self.VARIANTS)
+        run, rows, summary = self.study("packing", DISKS, self.ASKED, *self.VARIANTS, drawn=True)
         self.assertEqual(len(rows), 7)
         runs = {tolerance: run_case(merged(DISKS, {"solver": {"tolerance": tolerance}, "output": {"every": 30, "stress": True}}),
                                     directory=self.here(f"run {tolerance}")) for tolerance in (1e-2, 1e-6)}

@@ -1,11 +1,11 @@
 """gravier_blocks: walls, towers, arches and Voronoi blocks run and stand, their volumes add up, and bad figures are refused."""
 import os
-import subprocess
 import sys
 import unittest
 
 import h5py
 import numpy as np
+from forked_scripts import script
 from gravier_runs import SOURCE, RunTestCase, gravier
 
 import gravier as package
@@ -27,8 +27,7 @@ DENSITY = 2000.0
 
 
 def make(arguments, directory):
-    return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=directory, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, text=True, check=False)
+    return script(PROGRAM, *arguments, directory=directory)
 
 
 class BlockStructures(RunTestCase):

@@ -17,7 +17,9 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import forked_scripts
 import h5py
+import matplotlib.pyplot  # noqa: F401
 
 SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
 PROGRAMS = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin")).resolve()
@@ -320,6 +322,12 @@ class Blocks(unittest.TestCase):
         launched += "".join(f" {name}='{os.environ[name]}'" for name in self.more if name in os.environ)
         for name in ("data", "drivers"):
             (self.work / name).symlink_to(SOURCE / name)
+        # scripts of Gravier and blocks of Python run in copies of this program, which has what they import
+        self.server = forked_scripts.Server(str(self.directory))
+        self.addCleanup(self.server.stop)
+        for name in sorted(os.listdir(PROGRAMS)):
+            if (PROGRAMS / name).resolve().suffix == ".py":
+                self.server.program(self.bin / name, str(PROGRAMS / name))
         # `python3` is the one that has h5py
         for name, program in (("mpirun", f'{launched} "{MPIEXEC}"'), ("python3", f'"{sys.executable}"')):
             launcher = self.bin / name
@@ -336,7 +344,10 @@ class Blocks(unittest.TestCase):
             elif block.is_tested():
                 script = self.directory / f"line{block.line}"
                 script.write_text(block.text, encoding="utf-8")
-                command = [sys.executable if block.language == "python" else "sh", *(["-eu"] if block.language == "sh" else []), script]
+                command = ["sh", "-eu", script]
+                if block.language == "python":
+                    command = [self.directory / f"python{block.line}"]
+                    self.server.program(*command, str(script))
             else:
                 continue
             count += 1

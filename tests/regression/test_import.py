@@ -10,7 +10,8 @@ import time
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, gravier, namelist, write
+from forked_scripts import script
+from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, alone_environment, gravier, namelist, write
 
 IMPORT = os.path.join(PROGRAMS, "gravier_import")
 G = 9.81
@@ -110,8 +111,9 @@ class Import(RunTestCase):
 
     def convert(self, box, *options, step=1e-3, steps=50, status=0, **variables):
         folder = self.fresh("run")
-        done = subprocess.run([sys.executable, IMPORT, box, "--step", str(step), "--steps", str(steps), "--out", "case", *options],
-                              cwd=folder, capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ, **variables})
+        with alone_environment() as environment:
+            done = script(IMPORT, box, "--step", step, "--steps", steps, "--out", "case", *options, directory=folder,
+                          environment={**environment, **variables})
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         self.assertEqual("is not checked" in done.stderr, "GRAVIER_PROGRAM" in variables)
         return folder, done.stderr
@@ -885,8 +887,8 @@ class Import(RunTestCase):
         folder, _ = self.convert(box)
         made = sorted(os.listdir(folder))
         self.assertEqual(made, ["case.h5", "case.nml", "case_contacts.csv", "case_drive_1.csv"])
-        command = [sys.executable, IMPORT, box, "--step", "1e-3", "--steps", "50", "--out", "case"]
-        again = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        command = [IMPORT, box, "--step", "1e-3", "--steps", "50", "--out", "case"]
+        again = script(*command, directory=folder)
         self.assertEqual((again.returncode, sorted(os.listdir(folder))), (0, made), again.stderr)
         with h5py.File(os.path.join(self.scratch, "own.h5"), "w") as file:
             file["bodies/id"] = [1]
@@ -896,7 +898,7 @@ class Import(RunTestCase):
             with self.subTest(name), open(os.path.join(folder, name), "rb") as file:
                 before = file.read()
                 own = write(os.path.join(folder, name), image if name == "case.h5" else b"own\n")
-                done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+                done = script(*command, directory=folder)
                 self.assertEqual(done.returncode, 2, done.stderr)
                 self.assertRegex(done.stderr, rf"\Agravier_import: error: --out case: {name}: there is a file of another kind or origin, which is not .*\n\Z")
                 with open(own, "rb") as kept:

@@ -2,14 +2,13 @@
 writers, 200 steps of 1 ms by LMGC90 with its tolerance 1e-10) are in equilibrium under the forces that are imported, and keep them."""
 import os
 import shutil
-import subprocess
-import sys
 import unittest
 
 import h5py
 import numpy as np
 
-from gravier_runs import ENVIRONMENT, PROGRAMS, SOURCE, RunTestCase, gravier
+from forked_scripts import script
+from gravier_runs import PROGRAMS, SOURCE, RunTestCase, alone_environment, gravier
 
 IMPORT = os.path.join(PROGRAMS, "gravier_import")
 #: dimension, bodies that move freely, contacts that press
@@ -21,8 +20,9 @@ class ImportForces(RunTestCase):
     def convert(self, box, *options, status=0):
         folder = os.path.join(self.scratch, f"run{len(os.listdir(self.scratch))}")
         os.mkdir(folder)
-        done = subprocess.run([sys.executable, IMPORT, box, "--step", "1e-3", "--steps", "1", "--out", "case", *options], cwd=folder,
-                              capture_output=True, text=True, check=False, env={**ENVIRONMENT, **os.environ})
+        with alone_environment() as environment:
+            done = script(IMPORT, box, "--step", "1e-3", "--steps", "1", "--out", "case", *options, directory=folder,
+                          environment=environment)
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
         return folder, done.stderr
 

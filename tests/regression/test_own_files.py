@@ -3,10 +3,11 @@ the same ending stay as they are."""
 import os
 import shutil
 import subprocess
-import sys
 import unittest
 
 import h5py
+import matplotlib.pyplot  # noqa: F401
+from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, merged, run_case, write
 
 import gravier
@@ -55,9 +56,9 @@ class OwnFiles(RunTestCase):
         shutil.copytree(self.run_directory, self.work)
 
     def tool(self, name, out):
-        script, *arguments = TOOLS[name]
-        return subprocess.run([sys.executable, os.path.join(SOURCE, "drivers", script), *arguments, out], cwd=self.work,
-                              env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        path, *arguments = TOOLS[name]
+        return script(os.path.join(SOURCE, "drivers", path), *arguments, out, directory=self.work,
+                      environment={**ENVIRONMENT, **os.environ})
 
     def files(self):
         """What is in each file below the directory."""

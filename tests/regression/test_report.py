@@ -4,6 +4,7 @@ it without overlaps and within its window, wide and narrow.
 A browser is looked for as $GRAVIER_BROWSER, chromium, chromium-browser or google-chrome; without one the test says so and is skipped."""
 import base64
 import contextlib
+import html
 import html.parser
 import io
 import json
@@ -13,9 +14,11 @@ import shutil
 import subprocess
 import sys
 import unittest
+import unittest.mock
 
 import h5py
 import matplotlib.image
+import matplotlib.pyplot as plt
 import numpy as np
 from gravier_runs import SOURCE, RunTestCase, merged
 
@@ -23,6 +26,7 @@ import gravier
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/report"))
 import gravier_report  # noqa: E402
+import figures  # noqa: E402
 from asked import is_default  # noqa: E402
 from run_log import RunLog  # noqa: E402
 import verdict  # noqa: E402
@@ -45,6 +49,12 @@ MEASURE = """<script>window.addEventListener('load', () => {
     blocks: [...document.querySelectorAll('section > *')].map(box) };
   const place = document.createElement('pre'); place.id = 'measured'; place.textContent = JSON.stringify(found);
   document.body.append(place); });</script>"""
+
+
+def undrawn(figure, words, dpi=120):
+    """In place of a picture of a report: an element that shows nothing."""
+    plt.close(figure)
+    return f'<img src="data:image/png;base64," alt="{html.escape(words)}">'
 
 
 class Page(html.parser.HTMLParser):
@@ -122,18 +132,23 @@ class Report(RunTestCase):
                 status = end.code
         return status, said.getvalue()
 
-    def page_of(self, directory):
-        """The page of a run, and its text; it loads nothing, and each picture is one, with words for who does not see it."""
+    def page_of(self, directory, drawn=True):
+        """The page of a run; it loads nothing, and each picture is one, with words for who does not see it. Pictures that are the same
+        as of another run need not be drawn, which takes nine tenths of the time."""
         place = os.path.dirname(directory) if os.path.basename(directory) == "results" else directory
         out = self.here(f"{os.path.basename(place)}.html")
-        status, said = self.report(directory, "-o", out)
+        with contextlib.ExitStack() as instead:
+            if not drawn:
+                instead.enter_context(unittest.mock.patch.object(figures, "picture", undrawn))
+                instead.enter_context(unittest.mock.patch.object(figures, "draw_panels", lambda *_, **__: plt.figure()))
+            status, said = self.report(directory, "-o", out)
         self.assertEqual((status, said), (0, out + "\n"))
         with open(out, encoding="utf-8") as file:
             text = file.read()
         page = Page(text)
         self.assertEqual((page.open, page.loads), ([], []))
         self.assertIn("default-src 'none'", text)
-        for image in page.images:
+        for image in page.images if drawn else ():
             pixels = matplotlib.image.imread(io.BytesIO(base64.b64decode(image.split(",", 1)[1])), format="png")
             self.assertGreater(min(pixels.shape[:2]), 150)
             self.assertGreater(pixels[:, :, :3].std(), 0.02, "a blank picture")
@@ -314,16 +329,16 @@ class Report(RunTestCase):
         shutil.copytree(self.here("good/results"), place)
         with h5py.File(os.path.join(place, "results.h5"), "r+") as file:
             file["steps/120/bodies/position"][0, 0] += 1.0
-        page = self.page_of(place)
+        page = self.page_of(place, drawn=False)
         self.assertIn("its attribute checksum is not that of what it holds", page.text["pictures"])
         self.assertIn("its attribute checksum", self.answer(page, "Are its files")[2])
         with h5py.File(os.path.join(place, "results.h5"), "r+") as file:
             del file["steps/120/bodies/position"], file["steps/120/bodies/id"]
             file["steps/120/bodies/position"], file["steps/120/bodies/id"] = np.ones((36, 2)), np.ones(36, int)
-        self.assertIn("bodies whose ids do not ascend", self.page_of(place).text["pictures"])
+        self.assertIn("bodies whose ids do not ascend", self.page_of(place, drawn=False).text["pictures"])
         with open(os.path.join(place, "results.h5"), "wb") as file:
             file.write(b"nothing")
-        page = self.page_of(place)
+        page = self.page_of(place, drawn=False)
         self.assertIn("results.h5: cannot read this file", page.text["warnings"])
         self.assertIn("There is no results.h5", page.text["pictures"])
         self.assertEqual(page.attributes["headline"]["data-grade"], "bad")
@@ -344,7 +359,7 @@ class Report(RunTestCase):
         place = self.here("bare")
         shutil.copytree(self.here("good/results"), place)
         os.remove(os.path.join(place, "history.csv"))
-        page = self.page_of(place)
+        page = self.page_of(place, drawn=False)
         self.assertIn("This run ended, but not all of its files are there and whole.", page.text["headline"])
         self.assertEqual([row[0] for row in page.rows["answers"]], ["✓"] * 5 + ["✗"])
         self.assertEqual(self.answer(page, "Did it come")[2], "Yes: 120 of 120 steps.")
@@ -363,7 +378,7 @@ class Report(RunTestCase):
         for last, names in (("100", ("history.csv", "results.h5")), ("130", ("history.csv",))):
             with open(os.path.join(place, "run.log"), "w", encoding="utf-8") as file:
                 file.write(said.replace("    steps = 120\n", f"    steps = {last}\n"))
-            page = self.page_of(place)
+            page = self.page_of(place, drawn=False)
             self.assertEqual(self.answer(page, "Are its files")[2], "Not all: " + " ".join(
                 f"run.log ends with step {last}, {name} with step 120: they are not of one run." for name in names))
             self.assertIn("not all of its files are there and whole", page.text["headline"])

@@ -224,13 +224,14 @@ class GivenForces(RunTestCase):
 
     def test_other_steps_and_effects(self):
         """What final_bodies.h5 leaves of packings with other effects is found again, with another step too."""
+        few = {"count": 60, "box": 0.15}
         cases = {
-            "rolling": {"scene": {"rolling_friction": 0.05}},
+            "rolling": {"scene": {"rolling_friction": 0.05}, "sample": few},
             "spheres": {"scene": {"dimension": 3, "rolling_friction": 0.05, "pivoting_friction": 0.05},
                         "sample": {"count": 60, "box": [0.06, 0.06], "solid_fraction": 0.25}},
-            "periodic": {"scene": {"period": [0.25, 0.0]}, "sample": {"box": None}},
+            "periodic": {"scene": {"period": [0.15, 0.0]}, "sample": {**few, "box": None}},
             "adhesive": {"material": [{"name": "wet"}], "law": [{"materials": ["wet", "wet"], "kind": "adhesive", "adhesion": 0.5, "adhesion_range": 1e-4, "friction": 0.3}],
-                         "scene": {"friction": None}},
+                         "scene": {"friction": None}, "sample": few},
         }
         for name, change in cases.items():
             with self.subTest(name):

@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 
-from gravier_runs import LONG, RunTestCase, contents, differences, gravier, merged, namelist, read_csv, run_case, steps_of, write
+from gravier_runs import LONG, RunTestCase, contents, differences, gravier, merged, namelist, read_csv, run_case, write
 from shaped_scenes import LIBRARY
 
 H = 1e-3
@@ -39,13 +39,10 @@ def changed(**keys):
 def states(run):
     """Bodies by step: (identifiers, fields)."""
     found = run.results()
-    fields = {}
-    for name, value in found.items():
-        parts = name.split("/", 4)
-        if parts[1] == "steps" and parts[3:4] == ["bodies"] and len(parts) == 5 and "@" not in name:
-            fields.setdefault(int(parts[2]), {})[parts[4]] = value
-    for step in steps_of(found):
-        yield step, fields[step]["id"], fields[step]
+    for step in found.steps():
+        place = f"/steps/{step}/bodies"
+        fields = {name: found[f"{place}/{name}"] for name in found.names(place)}
+        yield step, fields["id"], fields
 
 
 def middles(fields):

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from forked_scripts import script
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
@@ -89,8 +90,7 @@ class Studies(unittest.TestCase):
                     ("masonry", ["--out", place], f"{place}: there is something that no study has made, which is not replaced; expected another --out"),
                     ("sound", ["--out", place], f"{place}: there is something that no study has made")):
                 with self.subTest(name=name, options=options):
-                    run = subprocess.run([sys.executable, os.path.join(SOURCE, f"drivers/studies/study_{name}.py"), *options], cwd=place,
-                                         capture_output=True, text=True, check=False, timeout=300)
+                    run = script(os.path.join(SOURCE, f"drivers/studies/study_{name}.py"), *options, directory=place)
                     self.assertEqual(run.returncode, 2, run.stderr)
                     self.assertEqual(len(run.stderr.splitlines()), 1, run.stderr)
                     self.assertIn(line, run.stderr)

@@ -16,8 +16,10 @@ import sys
 import tempfile
 import unittest
 
-import h5py
 import numpy as np
+
+from forked_scripts import script
+from results_contents import Results, contents, steps_of  # noqa: F401
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 sys.path.insert(0, os.path.join(SOURCE, "drivers/python"))
@@ -45,7 +47,7 @@ ENVIRONMENT = {
     "OMPI_MCA_hwloc_base_binding_policy": "none", "OMPI_MCA_mpi_yield_when_idle": "1",
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1",
     # messages within one machine; a search for networks would take longer than most runs
-    "OMPI_MCA_pml": "ob1",
+    "OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "vader,self",
     # ranks are not bound to processors, whose caches and distances would take half of the start of a program to find out
     "HWLOC_COMPONENTS": "no_os,stop",
     # after a rank that failed the launcher would wait seconds for ranks that have left
@@ -70,20 +72,20 @@ class Run:
 
     def __init__(self, directory, status, stdout, stderr, launcher):
         self.directory, self.status, self.stdout, self.stderr, self.launcher = directory, status, stdout, stderr, launcher
-        #: file that `results` has read, by name, time of its last change and size; and what was in it
-        self._read, self._found = None, {}
+        #: file that `results` has read, by name, time of its last change and size; and what is in it
+        self._read, self._found = None, None
 
     def path(self, *names):
         return os.path.join(self.directory, *names)
 
     def results(self, directory="results"):
-        """Everything in results.h5, read once as long as the file stays as it is."""
+        """What is in results.h5, read once as long as the file stays as it is."""
         path = self.path(directory, "results.h5")
         state = os.stat(path)
         if self._read != (path, state.st_mtime_ns, state.st_size):
-            self._found = contents(path)
+            self._found = Results(path)
             self._read = path, state.st_mtime_ns, state.st_size
-        return dict(self._found)
+        return self._found
 
     def history(self, directory="results"):
         return read_csv(self.path(directory, "history.csv"))
@@ -217,55 +219,6 @@ def write(path, text):
     return path
 
 
-def contents(path):
-    """Everything in an HDF5 file: {path: array} and {path@attribute: value}."""
-    found = {}
-    with h5py.File(path, "r") as file:
-        _collect(file.id, "", found)
-    return found
-
-
-def _collect(group, path, found):
-    """Put all below a group into `found`, by the library's own calls, in half the time that h5py's objects take."""
-    for k in range(group.get_num_objs()):
-        name = group.get_objname_by_idx(k)
-        place = f"{path}/{name.decode()}"
-        node = h5py.h5o.open(group, name)
-        for number in range(h5py.h5a.get_num_attrs(node)):
-            attribute = h5py.h5a.open(node, index=number)
-            kind = attribute.dtype
-            if kind.kind == "O":
-                values = np.asarray(h5py.AttributeManager(_OfNode(node))[attribute.name])
-            else:
-                values = np.empty(attribute.shape, kind)
-                attribute.read(values)
-            found[f"{place}@{attribute.name.decode()}"] = values
-        if isinstance(node, h5py.h5g.GroupID):
-            found[place] = "group"
-            _collect(node, place, found)
-            continue
-        kind = node.dtype
-        if kind.kind == "O":
-            found[place] = h5py.Dataset(node)[()]
-            continue
-        values = np.empty(node.shape, kind)
-        node.read(h5py.h5s.ALL, h5py.h5s.ALL, values)
-        found[place] = values[()]
-
-
-class _OfNode:
-    """What h5py asks of the owner of attributes."""
-
-    def __init__(self, node):
-        self.id = node
-
-
-def steps_of(results):
-    """Numbers of the steps of a results file, in ascending order."""
-    return sorted(int(name.split("/")[2]) for name in results if name.startswith("/steps/") and name.count("/") == 2
-                  and "@" not in name)
-
-
 def read_cells(path):
     """A table as {column: array of texts}; every line must be whole."""
     with open(path, encoding="ascii") as file:
@@ -328,5 +281,4 @@ class StudyTestCase(RunTestCase):
 
     def run_study(self, *arguments):
         environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, self.study, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        return script(self.study, *arguments, directory=self.scratch, environment=environment)

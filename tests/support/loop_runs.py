@@ -4,7 +4,8 @@ import sys
 
 import numpy as np
 
-from gravier_runs import SOURCE, RunTestCase, contents, differences, gravier, merged, namelist, write
+import forked_scripts
+from gravier_runs import SOURCE, Run, RunTestCase, alone_environment, contents, differences, gravier, merged, namelist, write
 
 os.environ["PYTHONPATH"] = os.pathsep.join([os.path.join(SOURCE, "drivers/python"), os.environ.get("PYTHONPATH", "")])
 
@@ -65,7 +66,12 @@ class LoopTestCase(RunTestCase):
         os.makedirs(directory, exist_ok=True)
         write(os.path.join(directory, "case.nml"), namelist(groups))
         write(os.path.join(directory, "loop.py"), SCRIPT + script)
-        run = gravier("loop.py", *arguments, ranks=ranks, directory=directory, program=sys.executable)
+        if ranks == 1:
+            with alone_environment() as environment:
+                done = forked_scripts.script("loop.py", *arguments, directory=directory, environment=environment)
+            run = Run(directory, done.returncode if done.returncode >= 0 else 128 - done.returncode, done.stdout, done.stderr, "")
+        else:
+            run = gravier("loop.py", *arguments, ranks=ranks, directory=directory, program=sys.executable)
         self.assert_status(run, status)
         return run
 

@@ -389,7 +389,7 @@ class Shapes(SmallScene):
 
     def normals(self, title, places, boundary):
         record = self.play(title, [Grain(place, radius=RADIUS) for place, _ in places], [boundary], steps=1,
-                           scene={"alert_distance": 0.02})
+                           scene={"alert_distance": 0.02}, output={"contacts": True})
         contacts = record.contacts[1]
         self.assertEqual(list(contacts["candidate"]), list(range(1, len(places) + 1)))
         for k, (place, foot) in enumerate(places):

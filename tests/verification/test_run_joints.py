@@ -81,7 +81,8 @@ class Joints(SmallScene):
         ridge = [{"shape": "segment", "point": [0.0, 0.0], "end": [side * 0.1, -0.05]} for side in (1, -1)]
         height = RADIUS / out[1]
         for name, boundaries, y, count in (("hollow", hollow, height, 2), ("ridge", ridge, RADIUS, 1), ("ridge, backwards", ridge[::-1], RADIUS, 1)):
-            record = self.play(name, [Grain([0.0, y], radius=RADIUS, mass=MASS)], boundaries, (0.0, -9.81), 3)
+            record = self.play(name, [Grain([0.0, y], radius=RADIUS, mass=MASS)], boundaries, (0.0, -9.81), 3,
+                               output={"contacts": True})
             self.assertEqual(len(record.contacts[-1]["gap"]), count, name)
             self.verify(name, "place of the disk [m]", record.position[-1, 0], [0.0, y], 1e-9)
         # however shallow a hollow is, something holds what lies in it, beside a mesh, too; ends may be apart by rounding and more
@@ -98,7 +99,8 @@ class Joints(SmallScene):
                         self.assertGreater(held.position[-1, 0, 1], 0.999 * RADIUS, f"{angle} {apart} {name} {x}")
         passes = [dict(ridge[0], material="air"), dict(ridge[1], material="stone")]
         record = self.play("left out", [Grain([0.0, RADIUS], radius=RADIUS, mass=MASS)], passes, (0.0, -9.81), 3,
-                           material=[{"name": "grain"}, {"name": "air"}, {"name": "stone"}], law=[{"materials": ["grain", "air"], "kind": "none"}])
+                           material=[{"name": "grain"}, {"name": "air"}, {"name": "stone"}], law=[{"materials": ["grain", "air"], "kind": "none"}],
+                           output={"contacts": True})
         self.assertEqual(len(record.contacts[-1]["gap"]), 1)
         self.verify("left out", "place of the disk [m]", record.position[-1, 0], [0.0, RADIUS], 1e-9)
 

@@ -217,7 +217,8 @@ class Wedge(SmallScene):
                 up, across = unit(dimension, -1), unit(dimension, 0)
                 sides = [np.cos(angle) * up + side * np.sin(angle) * across for side in (1, -1)]
                 ball = Grain(RADIUS / np.cos(angle) * up, radius=RADIUS, mass=MASS)
-                record = self.play(f"wedge {dimension} {degrees}", [ball], [plane(0 * up, side) for side in sides], -G * up, 5)
+                record = self.play(f"wedge {dimension} {degrees}", [ball], [plane(0 * up, side) for side in sides], -G * up, 5,
+                                   output={"contacts": True})
                 forces = np.array([contacts["impulse"][:, 0] for contacts in record.contacts[1:]]) / self.step
                 self.assertEqual(forces.shape, (5, 2))
                 wanted = MASS * G / (2 * np.cos(angle))

@@ -36,12 +36,12 @@ class Motion:
 
     def __init__(self, run):
         self.found, self.directory = run.results(), run.path("results")
-        self.steps = sorted({int(name.split("/")[2]) for name in self.found if name.startswith("/steps/") and name.count("/") > 2})
+        self.steps = self.found.steps()
         self.position = self.all("bodies/position")
         self.velocity = self.all("bodies/velocity")
 
     def all(self, name):
-        return np.array([self.found[f"/steps/{step}/{name}"] for step in self.steps])
+        return np.array(self.found.of_steps(name))
 
     def contacts(self, step=-1):
         return self.found[f"/steps/{self.steps[step]}/contacts/impulse"]

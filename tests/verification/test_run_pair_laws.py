@@ -156,7 +156,7 @@ class Adhesion(SmallScene):
                          steps=40, material=named("grain", "ceiling", "plate"),
                          law=[law(("grain", "ceiling"), "adhesive", adhesion=10 * self.force, adhesion_range=self.reach),
                               law(("grain", "plate"), "adhesive", adhesion=self.force, adhesion_range=self.reach)],
-                         output={"boundary_forces": True})
+                         output={"boundary_forces": True, "contacts": True})
 
     def test_pull_off(self):
         self.both(self.pull_off)
@@ -245,7 +245,7 @@ class Bridges(SmallScene):
                            steps=200, files={"plate.csv": table}, material=named("grain", "ceiling", "plate"),
                            law=[law(("grain", "ceiling"), "adhesive", adhesion=10.0, adhesion_range=0.02),
                                 law(("grain", "plate"), "capillary", capillarity=capillarity, decay_length=decay,
-                                    debonding_distance=debonding)])
+                                    debonding_distance=debonding)], output={"contacts": True})
         bridged, seen = True, set()
         for number, contacts in zip(record.step[1:], record.contacts[1:]):
             for antagonist, gap, impulse in zip(contacts["antagonist"], contacts["gap"], contacts["impulse"][:, 0]):
@@ -270,7 +270,8 @@ class Bridges(SmallScene):
         for near in (0.0, 0.004):
             bridge = law("a", "capillary", capillarity=capillarity, decay_length=decay, debonding_distance=0.005,
                          **({"bridge_distance": near} if near else {}))
-            record = self.play(f"bridges at the start {near}", grains, [], steps=17, material=named("a"), law=[bridge])
+            record = self.play(f"bridges at the start {near}", grains, [], steps=17, material=named("a"), law=[bridge],
+                               output={"contacts": True})
             contacts = record.contacts[1]
             found = {(first, second): -impulse / self.step for first, second, impulse in
                      zip(contacts["candidate"], contacts["antagonist"], contacts["impulse"][:, 0])}
@@ -303,7 +304,7 @@ class Bonds(SmallScene):
                            law=[law(("a", "ceiling"), "bonded", bond_strength=100 * weight, **bond),
                                 law(("ceiling", "b"), "bonded", bond_strength=100 * weight, **bond),
                                 law("a", "bonded", bond_strength=5.01 * weight, **bond),
-                                law("b", "bonded", bond_strength=4.9 * weight, **bond)], **groups)
+                                law("b", "bonded", bond_strength=4.9 * weight, **bond)], output={"contacts": True}, **groups)
         self.verify(case, "way below the strength of the bonds [m]", record.position[:, :6], record.position[:1, :6], 1e-10)
         ends = record.contacts[-1]
         tension = np.sort(-ends["impulse"][ends["candidate"] <= 6, 0]) / (weight * self.step)

@@ -1,12 +1,12 @@
 """The study of poured Platonic solids: its measure on places that are known, a small run, and what it says of its verdict."""
 import os
-import subprocess
 import sys
 import types
 import unittest
 
 import numpy as np
 
+from forked_scripts import script
 from gravier_runs import ENVIRONMENT, MPIEXEC, PROGRAMS, SOURCE, RunTestCase
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
@@ -27,8 +27,7 @@ class Platonic(RunTestCase):
 
     def run_study(self, *arguments):
         environment = {**ENVIRONMENT, **os.environ, "GRAVIER_BIN_DIR": PROGRAMS, "MPIEXEC": MPIEXEC}
-        return subprocess.run([sys.executable, PROGRAM, *arguments], cwd=self.scratch, env=environment, stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, check=False)
+        return script(PROGRAM, *arguments, directory=self.scratch, environment=environment)
 
     def test_measure(self):
         """Cubes in rows, each at 1.25 edges from the next and turned by a quarter about an axis: 0.8^3 within five standard deviations."""

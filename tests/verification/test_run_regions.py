@@ -57,13 +57,19 @@ def disk_below(t):
 
 class Regions(RunTestCase):
 
+    def setUp(self):
+        #: what the package has read of runs
+        self.read = {}
+
     def play(self, title, groups, ranks=1, options=(), status=0):
         run = run_case(groups, ranks=ranks, directory=self.here(title), options=options)
         self.assert_status(run, status)
         return run
 
     def region(self, run, name, step=None):
-        return package.Run(os.path.join(run.directory, "results")).region(name, step)
+        if run not in self.read:
+            self.read[run] = package.Run(os.path.join(run.directory, "results"))
+        return self.read[run].region(name, step)
 
     # ---- contacts
 

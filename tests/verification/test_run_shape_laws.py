@@ -12,7 +12,8 @@ from small_scenes import floats
 G = 9.81
 BLOCK = {2: "shape block\npolygon -0.1 -0.1  0.1 -0.1  0.1 0.1  -0.1 0.1\n", 3: "shape block\nbox 0.2 0.2 0.2\n"}
 STILL = {2: 0.0, 3: [1.0, 0.0, 0.0, 0.0]}
-EXACT = {"solver": {"method": "newton", "criterion": "residual", "tolerance": 1e-11, "max_iterations": 5000}, "output": {"every": 1}}
+EXACT = {"solver": {"method": "newton", "criterion": "residual", "tolerance": 1e-11, "max_iterations": 5000},
+         "output": {"every": 1, "contacts": False}}
 
 
 def up(dimension, height, along=0.0):
@@ -33,9 +34,7 @@ class ShapeLaws(RunTestCase):
 
     def track(self, run, name="position", place=0):
         """Of a body, by its place in the order of identifiers, over all steps."""
-        results = run.results()
-        steps = sorted(int(key.split("/")[2]) for key in results if key.startswith("/steps/") and key.endswith(f"/bodies/{name}"))
-        return np.array([results[f"/steps/{step}/bodies/{name}"][place] for step in steps])
+        return np.array([values[place] for values in run.results().of_steps(f"bodies/{name}")])
 
     def test_bonded_blocks_turn(self):
         """Two bonded blocks, and two of which one is glued to a hub, turn as one body: 6 radians with 0.03 in a step. Blocks in space turn about
@@ -187,7 +186,8 @@ class ShapeLaws(RunTestCase):
                 np.testing.assert_allclose(velocity, up(dimension, 0.6) + [0.0] * (2 * dimension - 3), atol=1e-9)
                 turn = 0.4 if dimension == 2 else [np.cos(0.2), np.sin(0.2) * 0.6, np.sin(0.2) * 0.8, 0.0]
                 run = self.play(f"corner {dimension}", dimension, [body("block", up(dimension, 0.2), turn, up(dimension, -1.0), scale=1.0)],
-                                [plane(dimension)], {"scene": {"restitution": 0.5, "gravity": [0.0] * dimension}, "time": {"steps": 120}})
+                                [plane(dimension)], {"scene": {"restitution": 0.5, "gravity": [0.0] * dimension}, "time": {"steps": 120},
+                                                     "output": {"contacts": True}})
                 results, velocity = run.results(), self.track(run, "velocity")
                 hit = next(step for step in range(1, 121) if f"/steps/{step}/contacts/impulse" in results
                            and np.any(results[f"/steps/{step}/contacts/impulse"] > 0.0))
@@ -250,7 +250,8 @@ class ShapeLaws(RunTestCase):
     def test_sent_back(self):
         """Tangential restitution sends the corner of a block back."""
         run = self.play("sent back", 2, [body("block", [0.0, 0.142], np.pi / 4, [1.0, -1.0])], [plane(2)], {
-            "scene": {"restitution": 0.5, "tangential_restitution": 0.5, "friction": 10.0, "gravity": [0.0, 0.0]}, "time": {"steps": 10}})
+            "scene": {"restitution": 0.5, "tangential_restitution": 0.5, "friction": 10.0, "gravity": [0.0, 0.0]}, "time": {"steps": 10},
+            "output": {"contacts": True}})
         velocity = self.track(run, "velocity")
         hit = int(np.argmax(np.abs(np.diff(velocity[:, 1])) > 0.1)) + 1
         point = run.results()[f"/steps/{hit}/contacts/point"][0]
