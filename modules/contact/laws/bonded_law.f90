@@ -79,8 +79,8 @@ contains
   end subroutine bonded_evaluate
 
   !> A bond at its limit breaks if its bodies part or slide faster than the solve may be wrong. One that moves less is in doubt.
-  !> Where bodies move, solves are compared with their motion, and a joint about which a long body turns opens slowly beside it. Such
-  !> a bond breaks once it has opened for several steps in a row, because errors of solves do not keep their sign.
+  !> Where bodies move, solves are compared with their motion, and a joint about which a long body turns opens slowly beside it.
+  !> Such a bond breaks once it has opened for several steps in a row, because errors of solves do not keep their sign.
   pure subroutine bonded_conclude(self, pair)
     class(bonded_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair

@@ -191,8 +191,8 @@ contains
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
 
-  !> Mass of the grains that the last iteration has moved by more than `velocity`, or that violations of contacts would move by more,
-  !> after `project` [kg]. Collective.
+  !> Mass of the grains that the last iteration has moved by more than `velocity`, or that violations of contacts would move by
+  !> more, after `project` [kg]. Collective.
   real(dp) function test_impulses_changing_mass(self, problem, velocity) result(mass)
     class(test_impulses_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem

@@ -74,8 +74,8 @@ module gravier_velocity_error
     !> waves cannot have crossed all bodies yet; the same of what a boundary moves through bonds. Iterations made at the last
     !> `assess`, and before the last `begin_anew`.
     logical, private :: is_early = .false.
-    !> root of the part of the mass that still changes, at least `least_root`; 1 where nothing changes, or as long as it is not asked
-    !> for
+    !> root of the part of the mass that still changes, at least `least_root`; 1 where nothing changes, or as long as it is not
+    !> asked for
     real(dp), private :: root_of_changing = 1.0_dp
     !> the iteration from which on E is believed of what a boundary moves through bonds, 0 where it is now
     integer :: believed_from = 0
