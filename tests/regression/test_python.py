@@ -222,7 +222,8 @@ class Package(RunTestCase):
                                ({("scene", "friction"): 0.1}, r"\('scene', 'friction'\): 0.1; expected a list of values$"),
                                ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$"),
                                ({TIED: [(1e-3, 2, 3)]}, r": \(0.001, 2, 3\); expected a value for each of these 2 keys$"),
-                               ({TIED: [1e-3]}, ": 0.001; expected a value for each of these 2 keys$"), ({(): [1]}, r"\(\): expected \(group, key\)")):
+                               ({TIED: [1e-3]}, ": 0.001; expected a value for each of these 2 keys$"), ({(): [1]}, r"\(\): expected \(group, key\)"),
+                               ({TIED: [(1e-3, 2)], ("time", "step"): [1e-3]}, r"\('time', 'step'\): changed twice; expected each key once$")):
             with self.assertRaisesRegex(gravier.CaseError, words):
                 list(gravier.study(base, changes, self.here("none")))
         # keys that change together; a table of another origin is nobody's to replace
@@ -240,7 +241,8 @@ class Package(RunTestCase):
         for point, place, status in gravier.study(parsed, {("time", "steps"): [2]}, self.here("parsed")):
             self.assertEqual((point, status), ({("time", "steps"): 2}, 0), place)
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
-            list(gravier.study(base, {("scene", "friction"): [-1.0]}, self.here("refused")))
+            list(gravier.study(base, {("scene", "friction"): [-1.0], ("output", "directory"): ["results"]}, self.here("refused")))
+        self.assertEqual(pathlib.Path(self.here("refused/study.csv")).read_text(), "run,status,scene.friction,output.directory\n")
         # one of several groups, by its name or its number
         several = {**base, "boundary": [{**GROUND, "name": "ground"}, {**GROUND, "name": "lower", "point": [0.0, -1.0]}]}
         for which in ("lower", 2):

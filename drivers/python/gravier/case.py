@@ -190,17 +190,23 @@ def write_case(groups, directory):
         part.write_text(MADE + text, encoding="utf-8")
 
 
+def made_directory(directory):
+    """A directory, made if need be."""
+    directory = Path(directory)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as what:
+        raise CaseError(f"{directory}: {what.strerror}; expected a place for a directory") from None
+    return directory
+
+
 def run(groups, directory, ranks=1, program=None):
     """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
     directory. Returns the exit status: 0, or 3 where a solve missed its tolerance. A directory where another `run` is under way, or where a
     case.nml or a terminal.log is of another origin, is refused, and nothing in it changes."""
     if not (isinstance(ranks, (int, float, np.integer, np.floating)) and ranks >= 1 and ranks % 1 == 0):
         raise CaseError(f"ranks = {ranks}: expected a whole number above 0")
-    directory = Path(directory)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as what:
-        raise CaseError(f"{directory}: {what.strerror}; expected a place for a directory") from None
+    directory = made_directory(directory)
     try:
         with output_lock(directory / "terminal.log", "gravier.run"):
             return run_alone(groups, directory, ranks, program)

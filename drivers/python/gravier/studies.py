@@ -2,12 +2,11 @@
 import csv
 import itertools
 import warnings
-from pathlib import Path
 
 import numpy as np
 from whole_file import whole_file
 
-from .case import CaseError, claim, run, value_text
+from .case import CaseError, claim, made_directory, run, value_text
 
 #: what the table of a study begins with
 HEADER = ("run", "status")
@@ -17,36 +16,41 @@ def study(base, changes, directory, ranks=1):
     """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
     `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
     times is (group, name, key), with the `name` of the group, or its number from 1. Keys that change together are a tuple of such keys, whose
-    values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row a run: its
-    directory, its exit status and its values. Warns of runs that an older, larger study has left."""
+    values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row for each run that
+    ended with status 0 or 3: its directory, its exit status and its values. Warns of runs that an older, larger study has left."""
     points = _points(changes)
-    directory = Path(directory)
+    directory = made_directory(directory)
     claim(directory / "study.csv", {".csv": ",".join(HEADER).encode()})
     older = sorted(int(place.name[4:]) for place in directory.glob("run_*") if place.name[4:].isdigit() and int(place.name[4:]) > len(points))
     if older:
         warnings.warn(f"{directory}: {', '.join(f'run_{number}' for number in older)} of an older study stay; this one has run_1 to run_{len(points)}",
                       stacklevel=2)
     rows = []
+    if points:
+        _write_table(directory / "study.csv", points[0], rows)
     for number, point in enumerate(points, 1):
         groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
         for what, value in point.items():
             _group_of(groups, *what)[what[-1]] = value
         place = directory / f"run_{number}"
         status = run(groups, place, ranks)
-        rows.append([place.name, status, *(value_text(value) for value in point.values())])
+        rows.append([place.name, status, *(value if isinstance(value, str) else value_text(value) for value in point.values())])
         _write_table(directory / "study.csv", point, rows)
         yield point, place, status
 
 
 def _points(changes):
     """Values of the keys of each run, {(group, key): value}."""
-    series = []
+    series, known = [], set()
     for what, values in changes.items():
         tied = isinstance(what, tuple) and what and all(isinstance(one, tuple) for one in what)
         keys = what if tied else (what,)
         for one in keys:
             if not (isinstance(one, tuple) and len(one) in (2, 3)):
                 raise CaseError(f"{one!r}: expected (group, key), or (group, name, key) of a group that stands several times")
+            if one in known:
+                raise CaseError(f"{one!r}: changed twice; expected each key once")
+            known.add(one)
         if isinstance(values, str) or not np.iterable(values):
             raise CaseError(f"{what}: {values!r}; expected a list of values")
         several = list(values) if tied else [(value,) for value in values]

@@ -45,7 +45,7 @@ module gravier_velocity_error
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> A grain still changes where an iteration moves it by more than this share of the error allowed. Where the grains that do have a
   !> small part of the mass, the others say nothing of their errors: E is divided by the root of this part, at least by this.
-  real(dp), parameter :: still_changes = 1.0e-4_dp, least_root = 0.1_dp
+  real(dp), parameter :: still_changes = 1.0e-4_dp, least_root = 0.03_dp
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
 
