@@ -57,6 +57,21 @@ class ShapeLaws(RunTestCase):
                     spins = [self.track(run, "velocity", place)[:, dimension:] for place in (0, 1)]
                     np.testing.assert_allclose(spins[0], spins[1], atol=1e-3 * rate)
 
+    def test_bonded_capsules_turn(self):
+        """Two capsules in one line, joined by a single bond at their ends, turn as one body: 6 radians with 0.03 in a step. Their ends stay together."""
+        rate, steps = 30.0, 200
+        rows = [body("rod", [x, 0.0], 0.0, [0.0, rate * x], rate) for x in (-0.08, 0.08)]
+        bond = {"materials": "m", "kind": "bonded", "bond_strength": 1e6, "bond_friction": 1.0, "bond_distance": 1e-4}
+        run = self.play("capsules", 2, rows, (), {"scene": {"gravity": [0.0, 0.0]}, "time": {"steps": steps, "step": 1e-3}, "material": [{"name": "m"}],
+                                                  "law": [bond]}, library="shape rod\ncapsule -0.05 0 0.05 0 0.03\n")
+        ends = []
+        for place, side in ((0, 0.08), (1, -0.08)):
+            turn = self.track(run, "orientation", place).reshape(-1)
+            ends.append(self.track(run, place=place) + side * np.transpose([np.cos(turn), np.sin(turn)]))
+        # orientations turn exactly and places by 2 atan(w h/2), which are 2e-6 rad apart in a step
+        np.testing.assert_allclose(ends[0], ends[1], atol=1e-4)
+        np.testing.assert_allclose(self.track(run, "velocity", 1)[-1, 2], rate, rtol=1e-4)
+
     def test_bonded_blocks_in_rings_turn(self):
         """Six bonded squares and eight bonded cubes turn as one body by 0.1 rad in a step. Half-way through the step they overlap by more than
         their roundings and at their edges meet in points that are no bonds. Their energy and their distances stay, and solves take few iterations."""
