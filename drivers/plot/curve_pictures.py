@@ -16,7 +16,8 @@ STYLES = ["-", "--", ":", "-."]
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
-         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s")]
+         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s"),
+         (r"gravity_[xyz]", "m/s²")]
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
 
 

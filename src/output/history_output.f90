@@ -14,7 +14,7 @@ module gravier_history_output
 
   !> columns of a cell that moves, as far as a scene has them: its strains and its shears
   character(len=*), parameter :: strains(3) = [character(len=13) :: "cell_strain_x", "cell_strain_y", "cell_strain_z"], &
-    & shears(3) = [character(len=13) :: "cell_shear_xy", "cell_shear_xz", "cell_shear_yz"]
+    & shears(3) = [character(len=13) :: "cell_shear_xy", "cell_shear_xz", "cell_shear_yz"], axes = "xyz"
 
   type, extends(output_t) :: history_output_t
     private
@@ -99,6 +99,11 @@ contains
         header = header//","//shears(k)
       end do
     end if
+    if (allocated(simulation%gravity_table%has)) then
+      do k = 1, simulation%decomposition%nd
+        header = header//",gravity_"//axes(k:k)
+      end do
+    end if
     do k = 1, simulation%diagnostics%n_columns
       if (simulation%diagnostics%in_history(k)) header = header//","//trim(simulation%diagnostics%name(k))
     end do
@@ -156,6 +161,11 @@ contains
         end do
         do k = 1, merge(1, 3, simulation%decomposition%nd == 2)
           call table%add(simulation%decomposition%period%shear(k))
+        end do
+      end if
+      if (allocated(simulation%gravity_table%has)) then
+        do k = 1, simulation%decomposition%nd
+          call table%add(simulation%physics%gravity(k))
         end do
       end if
       do k = 1, simulation%diagnostics%n_columns

@@ -372,6 +372,8 @@ class Forces(SmallScene):
             t, slope = record.time[:, None], 2.0 * np.array(rows[1])
             v = slope * t * (t + self.step) / 2
             self.verify(f"gravity from a table, {dimension}D", "velocity [m/s]", record.velocity[:, 0], v, 1e-12)
+            written = np.transpose([record.run.history()["gravity_" + x] for x in axes])
+            np.testing.assert_allclose(written, (slope * t)[1:], rtol=1e-12)
         self.both(check)
 
     def test_body_force(self):
