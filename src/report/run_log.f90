@@ -71,7 +71,7 @@ module gravier_run_log
     procedure :: write_head => run_log_write_head
     procedure :: write_step => run_log_write_step
     procedure :: look => run_log_look
-    procedure :: write_started => run_log_write_started
+    procedure :: write_events => run_log_write_events
     procedure :: write_interface => run_log_write_interface
     procedure :: write_scales => run_log_write_scales
     procedure :: write_memory => run_log_write_memory
@@ -218,9 +218,9 @@ contains
       & "energy [J]  wall [s]   remaining", error)
   end subroutine run_log_write_head
 
-  !> Boundaries that were removed at the start of a step. After the first step, what its solve started from, where the bodies file
-  !> gives contacts with forces, and how many bonds there are. Collective.
-  subroutine run_log_write_started(self, simulation, figures, error)
+  !> After each step, the boundaries that were removed at its start; after the first one also how many bonds there are, and what its
+  !> solve started from where the bodies file gives contacts with forces. Collective.
+  subroutine run_log_write_events(self, simulation, figures, error)
     class(run_log_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
     type(step_figures_t), intent(in) :: figures
@@ -240,7 +240,7 @@ contains
         & to_text(started%given)//" contacts touch in the first step, with "//to_text(per_mille/10)//"."// &
         & to_text(mod(per_mille, 10_i8))//" % of its normal forces", error)
     end associate
-  end subroutine run_log_write_started
+  end subroutine run_log_write_events
 
   !> Contacts and interface as the partition makes them now.
   subroutine run_log_write_interface(self, figures, subdomains, error)

@@ -169,7 +169,7 @@ contains
       call check_load_areas(simulation%decomposition, error)
       call simulation%advance(figures, error, watch=log)
       if (allocated(error)) return
-      call log%write_started(simulation, figures, error)
+      call log%write_events(simulation, figures, error)
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
       if (simulation%step == 1) call log%write_interface(figures, simulation%decomposition%n_subdomains, error)

@@ -69,7 +69,7 @@ contains
     call log%write_start(simulation, error)
     call scales%find(simulation)
     call simulation%assemble(figures)
-    call log%write_started(simulation, figures, error)
+    call log%write_events(simulation, figures, error)
     call log%write_interface(figures, simulation%decomposition%n_subdomains, error)
     call log%write_scales(simulation, scales, .true., warnings, error)
     if (figures%fast > 0) then

@@ -10,6 +10,22 @@ from .tables import ResultsError
 PROGRAM = "gravier.write_bodies"
 
 
+def claim_bodies_file(path, program, source):
+    """Refuse a path at which a bodies file of `program`, made from `source`, is not to be written."""
+    try:
+        check_place(path, dict.fromkeys((".h5", ".hdf5"), program), [source])
+    except Misplaced as refused:
+        raise ResultsError(str(refused)) from None
+
+
+def make_parent(path):
+    """Make the directory of a file, if need be."""
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+    except OSError as what:
+        raise ResultsError(f"{path}: {what.strerror}; expected a place for a file") from None
+
+
 def given_contacts(run, step=None):
     """Contacts of a state with their forces, as the group /contacts of a bodies file has them: (datasets by name, names of boundaries).
     Forces are impulses over the time step."""
@@ -36,19 +52,13 @@ def write_bodies(run, path, step=None):
     """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
     and periods are those of its input; walls and periods of a bodies file are in this one, and the edges of a cell that moves with their
     velocities. A file that is there is replaced where this function has made it."""
-    try:
-        check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [run.path])
-    except Misplaced as refused:
-        raise ResultsError(str(refused)) from None
+    claim_bodies_file(path, PROGRAM, run.path)
     if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
         raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
                            "&output writes such a file of the last state")
     bodies, boundaries, cell = run.bodies(step), run.boundaries(step), run.cell(step)
     contacts, names = given_contacts(run, step)
-    try:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-    except OSError as what:
-        raise ResultsError(f"{path}: {what.strerror}; expected a place for a file") from None
+    make_parent(path)
     with whole_file(path) as part, hdf5_file(part, PROGRAM) as file:
         for name in ("id", "position", "radius", "mass", "material"):
             if name in bodies:

@@ -1,9 +1,8 @@
 """Rough walls of glued grains from the sides of a sample."""
-from pathlib import Path
-
 import numpy as np
-from whole_file import Misplaced, check_place, hdf5_file, whole_file
+from whole_file import hdf5_file, whole_file
 
+from .restarts import claim_bodies_file, make_parent
 from .results import BodiesFile
 from .tables import ResultsError
 
@@ -19,10 +18,7 @@ def rough_walls(sample, path, sides, depth=None):
     The plane is left out, and so are the forces of contacts with it and within a group. Returns the number of grains of each side. In the case
     of the next run each group needs a &boundary of shape 'grains'. A file that is there is replaced where this function has made it."""
     bodies = BodiesFile(sample)
-    try:
-        check_place(path, dict.fromkeys((".h5", ".hdf5"), PROGRAM), [bodies.path])
-    except Misplaced as refused:
-        raise ResultsError(str(refused)) from None
+    claim_bodies_file(path, PROGRAM, bodies.path)
     table, planes = bodies.bodies(), bodies.boundaries()
     depth = 2.0 * table.radius.mean() if depth is None else depth
     if not depth > 0.0:
@@ -59,10 +55,7 @@ def _plane(bodies, planes, side):
 
 def _write(bodies, path, numbers, group, removed):
     """Copy what stays as it is; grains get groups, planes `removed` and their contacts go."""
-    try:
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-    except OSError as what:
-        raise ResultsError(f"{path}: {what.strerror}; expected a place for a file") from None
+    make_parent(path)
     with bodies._open() as old, whole_file(path) as part, hdf5_file(part, PROGRAM) as file:
         for name in old:
             if name not in ("walls", "contacts"):

@@ -11,8 +11,9 @@ module gravier_bonded_law
   private
   public :: bonded_law_t
 
-  !> State of a pair with an intact bond; that of all others is 0. A bond that opens by less than the solve may be wrong counts by
-  !> how much, in so many parts of what the solve of one step may be wrong, and breaks after so many times that.
+  !> State of a pair with an intact bond; that of all others is 0. A bond at its limit may open by less than the solve may be wrong.
+  !> Its state then counts how far it has opened, and `parts` stand for what the solve of one step may be wrong. It breaks beyond
+  !> `most_opened` times that.
   integer, parameter :: intact = 1, parts = 1000, most_opened = 2
 
   type, extends(contact_law_t) :: bonded_law_t
