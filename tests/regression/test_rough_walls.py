@@ -73,13 +73,13 @@ class RoughWalls(RunTestCase):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.rough_walls(self.sample, path, sides, depth)
             self.assertFalse(path.exists())
+        write(path, "mine")
+        with self.assertRaisesRegex(gravier.ResultsError, "rough.h5: "):
+            gravier.rough_walls(self.sample, path, {"-y": 1})
+        self.assertEqual(path.read_text(), "mine")
         with h5py.File(self.sample, "a") as file:
             del file["walls/id"], file["walls/normal"]
             file["walls/id"], file["walls/normal"] = [101, 102, 103, 104], [[0.0, 1.0]] * 4
         for sides, number in (({"+y": 1}, 0), ({"-y": 1}, 4)):
             with self.assertRaisesRegex(gravier.ResultsError, f"{number} planes on the side .y; expected one"):
                 gravier.rough_walls(self.sample, path, sides)
-        write(path, "mine")
-        with self.assertRaises(gravier.ResultsError):
-            gravier.rough_walls(self.sample, path, {"-y": 1})
-        self.assertEqual(path.read_text(), "mine")

@@ -44,8 +44,8 @@ module gravier_velocity_error
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
   !> A grain still changes where an iteration moves it by more than `still_changes` times the error allowed. Where such grains have
-  !> a small part of the mass, the others say nothing of their errors. E is divided by the root of this part then, or by `least_root`
-  !> where that is larger.
+  !> a small part of the mass, the others say nothing of their errors. E is divided by the root of this part then, or by
+  !> `least_root` where that is larger.
   real(dp), parameter :: still_changes = 1.0e-4_dp, least_root = 0.03_dp
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
