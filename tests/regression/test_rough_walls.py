@@ -77,6 +77,7 @@ class RoughWalls(RunTestCase):
         with self.assertRaisesRegex(gravier.ResultsError, "rough.h5: "):
             gravier.rough_walls(self.sample, path, {"-y": 1})
         self.assertEqual(path.read_text(), "mine")
+        path.unlink()
         with h5py.File(self.sample, "a") as file:
             del file["walls/id"], file["walls/normal"]
             file["walls/id"], file["walls/normal"] = [101, 102, 103, 104], [[0.0, 1.0]] * 4
