@@ -47,7 +47,7 @@ contains
       if (.not. row%residual > 0.0_dp) return
       ! a solve finds the depths when it asks for them
       velocity%levels%most_depth = -1
-      call velocity%add_levels(problem)
+      call velocity%add_levels(problem, simulation%method)
       row%estimate = velocity%estimate()
       row%projection = velocity%projection
       row%levels = velocity%levels%error

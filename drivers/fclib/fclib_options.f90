@@ -1,6 +1,7 @@
 !> The command line of gravier_fclib.
 module gravier_fclib_options
   use gravier_kinds, only: dp
+  use gravier_text, only: text_from
   use gravier_errors, only: error_t, raise, status_input
   use gravier_file_system, only: path_t, add_path, list_files
   use gravier_command_line, only: argument, option_value, positive_integer, positive_real
@@ -123,7 +124,7 @@ contains
       methods(k) = rest(1:comma - 1)
       if (.not. any(rest(1:comma - 1) == friction_methods)) call raise(error, status_input, "--method '"//list// &
         & "': expected auto, nlgs, momentum, newton, or all")
-      rest = rest(comma + 1:)
+      rest = text_from(rest, comma + 1)
     end do
   end subroutine read_methods
 

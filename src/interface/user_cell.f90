@@ -1,6 +1,7 @@
 !> A periodic cell that moves in the loop of a user: its edges, and the rates and stresses that move it.
 module gravier_user_cell
   use gravier_kinds, only: dp
+  use gravier_text, only: text_from
   use gravier_errors, only: error_t, raise, status_input
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_cell_drive, only: cell_components, cell_component, component_row, component_column, stress_sign
@@ -118,7 +119,7 @@ contains
       if (c <= 3) names = names//", "//trim(lengths(c))//", "//trim(strains(c))
       if (c > 3) names = names//", "//trim(tilts(c - 3))//", "//trim(shears(c - 3))
     end do
-    names = names(2:)
+    names = text_from(names, 2)
   end function known
 
   !> With a blank before each of them.

@@ -4,7 +4,7 @@
 module gravier_user_loop
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, text_from
   use gravier_random_hash, only: hash_words
   use gravier_magnitude, only: is_bounded, bounded_text
   use gravier_communicator, only: communicator_t
@@ -229,7 +229,7 @@ contains
     do k = 1, size(values)
       text = text//" "//to_text(values(k), 4)
     end do
-    text = text(2:)
+    text = text_from(text, 2)
   end function numbers_text
 
   !> Number of a boundary by its name. Failure: status_input, with the names there are.

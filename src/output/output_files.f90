@@ -2,6 +2,7 @@
 !> it reads, and those of an older run that it does not replace are named in the log.
 module gravier_output_files
   use gravier_errors, only: error_t, raise, status_input
+  use gravier_text, only: text_from
   use gravier_communicator, only: communicator_t
   use gravier_file_system, only: place_of, place_t, check_directory, is_directory
   use gravier_hdf5_file, only: check_length
@@ -157,7 +158,7 @@ contains
       inquire (file=trim(config%output%directory)//"/"//name, exist=exists)
       if (exists) found = found//", "//name
     end do
-    found = found(3:)
+    found = text_from(found, 3)
   end function older_files
 
   !> The next of some names, empty after the last.
@@ -197,7 +198,7 @@ contains
         if ((item%wanted(config) .eqv. wanted) .and. item%files(config) /= "") names = names//","//item%files(config)
       end associate
     end do
-    names = names(2:)
+    names = text_from(names, 2)
   end function file_names
 
 end module gravier_output_files

@@ -2,6 +2,7 @@
 module gravier_machine
   use, intrinsic :: iso_fortran_env, only: compiler_options
   use gravier_kinds, only: i8
+  use gravier_text, only: text_from
   implicit none
   private
   public :: processor_model, last_cache, compiler_flags, date_text
@@ -82,7 +83,7 @@ contains
     do while (len(rest) > 0)
       blank = index(rest, " ")
       word = rest(1:blank - 1)
-      rest = rest(blank + 1:)
+      rest = text_from(rest, blank + 1)
       if (.not. changes_code(word) .or. index(" "//flags//" ", " "//word//" ") > 0) cycle
       if (len(flags) > 0) flags = flags//" "
       flags = flags//word

@@ -1,7 +1,7 @@
 !> The closing summary of a run, in words: whether it converged, where its time went, what would halve it.
 module gravier_run_summary
   use gravier_kinds, only: dp, i8
-  use gravier_text, only: to_text, counted
+  use gravier_text, only: to_text, counted, text_from
   use gravier_timers, only: phase_names, n_phases, phase_neighbourhood, phase_exchange, phase_factorise, phase_interface, &
     & phase_interface_solve, phase_reduction, phase_diagnostics, phase_output
   use gravier_convergence_history, only: at_tolerance
@@ -159,7 +159,7 @@ contains
         text = text//", in step "//to_text(tally%first_missed)
       end if
     end associate
-    text = text(3:)
+    text = text_from(text, 3)
 
   contains
 

@@ -1,7 +1,7 @@
 !> What the log of a run begins with: the program, the scene, its decomposition and what its effects cost.
 module gravier_start_lines
   use gravier_kinds, only: i8
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, text_from
   use gravier_communicator, only: mpi_library
   use gravier_boundary, only: boundary_t
   use gravier_build_info, only: version, revision, compiler, build_type, hdf5_version, mumps_version, metis_version
@@ -96,7 +96,7 @@ contains
       if (on(k) .eqv. wanted) text = text//", "//trim(names(k))
     end do
     if (text == "") text = ", nothing"
-    text = text(3:)
+    text = text_from(text, 3)
   end function effects_text
 
   !> What the effects cost.

@@ -3,7 +3,7 @@
 module gravier_checkpoint
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, text_from
   use gravier_periodic, only: period_words, period_record
   use gravier_narrow, only: take_count
   use gravier_checkpoint_file, only: checkpoint_file_t
@@ -212,7 +212,7 @@ contains
     if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp) simulation%quiet = own_quiet
     simulation%restarted = .true.
     simulation%division%overdue = division /= simulation%division%text() .and. simulation%division%subdomains > 1
-    simulation%set_before = simulation%set_before(len(settings_mark) + 1:)
+    simulation%set_before = text_from(simulation%set_before, len(settings_mark) + 1)
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)
     call load_grains(simulation, file, path, builds, error)

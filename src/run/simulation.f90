@@ -3,7 +3,7 @@ module gravier_simulation
   use gravier_kinds, only: dp, i8
   use gravier_allocator_tuning, only: keep_heap
   use gravier_errors, only: error_t, raise, status_input
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, text_from
   use gravier_communicator, only: communicator_t
   use gravier_schedule, only: schedule_t
   use gravier_time_table, only: time_table_t
@@ -363,7 +363,7 @@ contains
       if (.not. is_among(names(first:last), self%files)) self%files = self%files//","//names(first:last)
       first = last + 2
     end do
-    if (index(self%files, ",") == 1) self%files = self%files(2:)
+    if (index(self%files, ",") == 1) self%files = text_from(self%files, 2)
   end subroutine simulation_note_files
 
   !> Whether the run that is restarted has written a file of this name before; one that it has not written is of another run.

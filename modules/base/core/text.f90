@@ -3,7 +3,7 @@ module gravier_text
   use gravier_kinds, only: dp, i4, i8
   implicit none
   private
-  public :: to_text, times_text, counted, lower, shell_word, growing_text_t
+  public :: text_from, to_text, times_text, counted, lower, shell_word, growing_text_t
 
   !> Shortest usual text of a number: integers without blanks, reals with 9 significant digits
   !> or as many as asked, logicals as T or F. The exponent of a real has two digits, and three where it needs them; with 17
@@ -26,6 +26,15 @@ module gravier_text
   end type growing_text_t
 
 contains
+
+  !> A text from character `first` on. `text = text(first:)` must not be written: gfortran makes `text` shorter before it moves the
+  !> characters, and the last of them may be lost.
+  pure function text_from(text, first) result(rest)
+    character(len=*), intent(in) :: text
+    integer, intent(in) :: first
+    character(len=:), allocatable :: rest
+    rest = text(first:)
+  end function text_from
 
   !> One more piece at the end.
   pure subroutine growing_text_add(self, piece)

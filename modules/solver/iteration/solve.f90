@@ -229,7 +229,7 @@ contains
       end if
       call state%velocity%assess(problem, method, report%iterations, report%residual, defect)
     end if
-    if (state%velocity%criterion() <= limit) call state%velocity%add_levels(problem)
+    if (state%velocity%criterion() <= limit) call state%velocity%add_levels(problem, method)
     report%velocity_error = state%velocity%estimate()
     is_met = state%velocity%criterion() <= limit
   end subroutine find_whether_velocity_met

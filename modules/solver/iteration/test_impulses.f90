@@ -15,13 +15,14 @@
 module gravier_test_impulses
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: lanes
-  use gravier_body_mass, only: inverse_products
+  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_body_mass, only: inverse_products, inverse_of_translation, mass_product
   use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
   use gravier_cell_response, only: virial_of
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
   use gravier_kept_impulses, only: kept_impulses_t
+  use gravier_islands, only: islands_t, island_sums_t, find_islands
   implicit none
   private
   public :: test_impulses_t, projection_t
@@ -34,7 +35,9 @@ module gravier_test_impulses
   !> test impulses; places of the sums, the first of which make the residual: the powers y . w, the products of the velocities that
   !> test impulses make
   integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_products = at_powers + n_tests, &
-    & n_sums = at_products + n_tests*(n_tests + 1)/2
+    & n_products = n_tests*(n_tests + 1)/2, n_sums = at_products + n_products
+  !> sums over an island: the powers, the products, its mass and what bounds its error where rest is admissible
+  integer, parameter :: at_mass = n_tests + n_products + 1, at_rest = at_mass + 1, n_island_sums = at_rest
 
   !> What is held for one subdomain.
   type :: test_part_t
@@ -66,7 +69,7 @@ module gravier_test_impulses
     procedure :: begin_anew => test_impulses_begin_anew
     procedure :: take_earlier => test_impulses_take_earlier
     procedure :: project => test_impulses_project
-    procedure :: changing_mass => test_impulses_changing_mass
+    procedure :: project_islands => test_impulses_project_islands
     procedure, private :: has_copy => test_impulses_has_copy
   end type test_impulses_t
 
@@ -191,27 +194,129 @@ contains
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
 
-  !> Mass of the grains that the last iteration has moved by more than `velocity`, or that violations of contacts would move by
-  !> more, after `project` [kg]. Collective.
-  real(dp) function test_impulses_changing_mass(self, problem, velocity) result(mass)
+  !> The largest error of an island by its own projection, after `project` [m/s]: Y of its bodies over the root of their mass, or
+  !> the bound by rest where that is smaller. Collective.
+  real(dp) function test_impulses_project_islands(self, problem, method, iteration) result(error)
+    class(test_impulses_t), intent(in) :: self
+    type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
+    !> that of `project`
+    integer, intent(in) :: iteration
+    type(islands_t) :: islands
+    type(island_sums_t) :: sums(size(problem%sub))
+    real(dp) :: square
+    integer :: s, i
+
+    call find_islands(problem, islands)
+    do s = 1, size(sums)
+      allocate (sums(s)%value(n_island_sums, islands%part(s)%n), source=0.0_dp)
+      if (method%acceleration%extrapolates() .and. iteration > 0) then
+        call add_contacts(self, problem, islands, s, method%acceleration%part(s)%impulse, sums(s)%value)
+      else if (self%has_copy(iteration)) then
+        call add_contacts(self, problem, islands, s, self%part(s)%previous, sums(s)%value)
+      else
+        call add_contacts(self, problem, islands, s, problem%sub(s)%impulse, sums(s)%value)
+      end if
+      if (allocated(self%part(s)%load)) then
+        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), self%part(s)%load, islands%part(s)%of_body, sums(s)%value)
+      else
+        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), problem%sub(s)%reaction, islands%part(s)%of_body, &
+          & sums(s)%value)
+      end if
+    end do
+    call islands%complete(problem, n_island_sums, sums)
+    error = 0.0_dp
+    do s = 1, size(sums)
+      do i = 1, islands%part(s)%n
+        associate (value => sums(s)%value(:, i))
+          if (.not. value(at_mass) > 0.0_dp) cycle
+          square = projection_of(value(1:n_tests), value(n_tests + 1:at_mass - 1))
+          if (problem%rest_is_admissible) square = min(square, max(0.0_dp, value(at_rest)))
+          error = max(error, square/value(at_mass))
+        end associate
+      end do
+    end do
+    error = sqrt(problem%comm%highest(error))
+  end function test_impulses_project_islands
+
+  !> Add what the contacts of islands say: y . w of the tests, and twice the power of impulses on shifts.
+  subroutine add_contacts(self, problem, islands, s, previous, sums)
     class(test_impulses_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
-    !> [m/s]
-    real(dp), intent(in) :: velocity
-    real(dp) :: parts(size(problem%sub)), moved
-    integer :: s, b
+    type(islands_t), intent(in) :: islands
+    !> number of the subdomain on this rank
+    integer, intent(in) :: s
+    !> earlier impulses (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: previous(:, :, :)
+    !> (n_island_sums, islands)
+    real(dp), intent(inout), contiguous :: sums(:, :)
 
-    parts(:) = 0.0_dp
-    do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), part => self%part(s), nd => problem%kernels%nd)
-        do b = 1, sub%n_grains
-          moved = sub%inverse_mass(1, b)*max(norm2(part%recent(1:nd, b)), norm2(part%local(1:nd, b)))
-          if (moved > velocity) parts(s) = parts(s) + 1.0_dp/(sub%inverse_mass(1, b)*sub%multiplicity(b))
+    if (allocated(self%part(s)%on_bodies)) then
+      call add_with(self%part(s)%on_bodies)
+    else
+      call add_with(problem%sub(s)%impulse)
+    end if
+
+  contains
+
+    subroutine add_with(on_bodies)
+      !> impulses on the bodies
+      real(dp), intent(in), contiguous :: on_bodies(:, :, :)
+      !> blocks of contacts that are looked at together
+      integer, parameter :: together = 64
+      real(dp) :: powers(lanes, n_tests, together)
+      integer :: from, to, c, i, q, g
+
+      associate (sub => problem%sub(s), shift => problem%kernels%row%shift)
+        do from = 1, size(sub%hot, 3), together
+          to = min(from + together - 1, size(sub%hot, 3))
+          call problem%kernels%find_powers(sub%pair(:, (from - 1)*lanes + 1:to*lanes), sub%hot(:, :, from:to), &
+            & sub%inverse_mass, sub%v_global, sub%impulse(:, :, from:to), on_bodies(:, :, from:to), previous(:, :, from:to), &
+            & powers(:, :, 1:to - from + 1))
+          do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
+            i = islands%of_contact(s, sub, c)
+            if (i == 0) cycle
+            q = lane_of(c)
+            g = block_of(c)
+            sums(1:n_tests, i) = sums(1:n_tests, i) + powers(q, :, g - from + 1)
+            sums(at_rest, i) = sums(at_rest, i) + 2.0_dp*sub%impulse(q, 1, g)*sub%hot(q, shift, g)
+          end do
         end do
       end associate
+    end subroutine add_with
+
+  end subroutine add_contacts
+
+  !> Add what the bodies of islands say: the products of the velocities of the tests, the mass, and the square of the velocity.
+  subroutine add_bodies(sub, nd, part, load, island, sums)
+    type(subproblem_t), intent(in) :: sub
+    !> 2 or 3
+    integer, intent(in) :: nd
+    type(test_part_t), intent(in) :: part
+    !> H of the impulses on the bodies (nv, n_columns) [N s, N m s]
+    real(dp), intent(in), contiguous :: load(:, :)
+    !> of each body (n_bodies)
+    integer, intent(in), contiguous :: island(:)
+    !> (n_island_sums, islands)
+    real(dp), intent(inout), contiguous :: sums(:, :)
+    real(dp) :: products(n_products), factor(1), mass
+    integer :: b, i
+
+    factor(1) = 1.0_dp
+    do b = 1, sub%n_bodies
+      mass = inverse_of_translation(sub%inverse_mass(:, b), nd)
+      if (.not. mass > 0.0_dp) cycle
+      if (allocated(sub%concern)) factor(1) = sub%concern(b)
+      mass = factor(1)/(mass*sub%multiplicity(b))
+      call inverse_products(sub%inverse_mass(:, b:b), sub%multiplicity(b:b), part%local(:, b:b), load(:, b:b), &
+        & part%recent(:, b:b), products, factor)
+      i = island(b)
+      sums(n_tests + 1:at_mass - 1, i) = sums(n_tests + 1:at_mass - 1, i) + products
+      sums(at_mass, i) = sums(at_mass, i) + mass
+      sums(at_rest, i) = sums(at_rest, i) + &
+        & factor(1)*mass_product(sub%inverse_mass(:, b), sub%v_global(:, b), sub%v_global(:, b))/sub%multiplicity(b)
     end do
-    mass = problem%comm%sum_real(parts)
-  end function test_impulses_changing_mass
+  end subroutine add_bodies
 
   !> H y of a subdomain's tests at 0; the first time room is made for them and for the powers at contacts.
   subroutine make_room(part, problem, sub, power)

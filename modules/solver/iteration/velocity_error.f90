@@ -11,8 +11,8 @@
 !>      at rest. The estimate is the smaller of E and C, and C where that is below a tenth of the error allowed.
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
 !> law by much, and no body sink by much onto what is below it. Where nearly all bodies are at rest and some are faster, these may
-!> roll or be in error: E has to be at most a third of what moves there. Where few grains still change, the others say nothing of
-!> their errors, and E has to be smaller. See doc/theory.md, section 24.
+!> roll or be in error: E has to be at most a third of what moves there. Where bodies move, 3.2 Y of each island of bodies that
+!> contacts join (gravier_islands), by its own mass, has to be within the error allowed, too. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_body_mass, only: inverse_of_translation, are_uneven
@@ -43,10 +43,6 @@ module gravier_velocity_error
   real(dp), parameter :: rounding = 1.0e-13_dp
   !> what is not known; its multiples and those of a weight are numbers still [m/s]
   real(dp), parameter :: unknown = 1.0e-3_dp*sqrt(huge(1.0_dp))
-  !> A grain still changes where an iteration moves it by more than `still_changes` times the error allowed. Where such grains have
-  !> a small part of the mass, the others say nothing of their errors. E is divided by the root of this part then, or by
-  !> `least_root` where that is larger.
-  real(dp), parameter :: still_changes = 1.0e-4_dp, least_root = 0.03_dp
   !> iterations before which Y and L are not trusted
   integer, parameter :: copies_ready = 4
 
@@ -75,9 +71,8 @@ module gravier_velocity_error
     !> waves cannot have crossed all bodies yet; the same of what a boundary moves through bonds. Iterations made at the last
     !> `assess`, and before the last `begin_anew`.
     logical, private :: is_early = .false.
-    !> root of the part of the mass that still changes, at least `least_root`; 1 where nothing changes, or as long as it is not
-    !> asked for
-    real(dp), private :: root_of_changing = 1.0_dp
+    !> largest Y of an island, or C of it where that is smaller; 0 as long as it is not asked for [m/s]
+    real(dp), private :: projection_of_islands = 0.0_dp
     !> the iteration from which on E is believed of what a boundary moves through bonds, 0 where it is now
     integer :: believed_from = 0
     integer, private :: iterations = 0, begun_at = 0
@@ -164,7 +159,7 @@ contains
     self%is_restless = .false.
     self%is_early = .false.
     self%believed_from = 0
-    self%root_of_changing = 1.0_dp
+    self%projection_of_islands = 0.0_dp
     self%largest_violation = 0.0_dp
     if (.not. (problem%rest_is_admissible .and. self%mass > 0.0_dp)) return
     self%bound_by_rest = sqrt(max(0.0_dp, problem%kinetic + 2.0_dp*problem%shift_power)/self%mass)
@@ -200,15 +195,13 @@ contains
 
   !> What is compared with the error that is allowed [m/s]: E with a larger factor of L, or C over a fraction of that error. What
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much,
-  !> and no body sink by much. What moves where nearly all bodies are at rest has to be known better.
+  !> no body sink by much, and no island be wrong by more than all may be. What moves where nearly all bodies are at rest has to be known better.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &
-      & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)))
+      & min(self%bound_by_rest/share_at_rest, self%wave(weight_of_sinking)), weight_of_projection*self%projection_of_islands)
     if (self%bound_by_rest <= nearly_at_rest*self%allowed) criterion = max(criterion, self%levels%fastest/sinking_allowed)
     if (self%has_followed) criterion = max(criterion, error_of_bodies(self))
-    if (self%root_of_changing < 1.0_dp) criterion = max(criterion, &
-      & min(self%bound_by_rest, self%wave(weight_of_levels))/self%root_of_changing)
     if (self%is_restless) criterion = max(criterion, self%wave(weight_of_sinking)/self%share_of_motion(), &
       & self%levels%fastest_that_moves/speed_at_rest)
     ! what is reported then is the bound by rest, which has to be within the error allowed, too
@@ -276,17 +269,15 @@ contains
   !> L, after `assess`; and, where all else is within the error allowed, whether some body moves among bodies at rest, and how fast
   !> each body sinks if bounds do not tell enough. Where few heavy bodies have most of the mass, E says little of the others.
   !> Collective.
-  subroutine velocity_error_add_levels(self, problem)
+  subroutine velocity_error_add_levels(self, problem, method)
     class(velocity_error_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
+    class(method_t), intent(in) :: method
     !> times the error allowed that no body may sink by
     real(dp) :: limit
     !> iterations before which E is not believed: waves go down once after a pass, and down and up where bodies hold by traction
     integer :: early
-    !> of the grains that still change [kg]
-    real(dp) :: mass
 
-    mass = 0.0_dp
     call self%levels%add(problem, self%mass, self%largest_violation)
     self%has_levels = .true.
     self%has_followed = .false.
@@ -296,10 +287,10 @@ contains
     self%is_early = self%iterations < early .and. (problem%carries .or. self%bound_by_rest <= slow*problem%error_scale)
     self%believed_from = merge(early, 0, self%is_early .and. problem%carries)
     if (self%criterion() > self%allowed) return
-    if (self%mass > 0.0_dp .and. self%bound_by_rest > self%most_at_rest) &
-      & mass = self%tests%changing_mass(problem, still_changes*self%allowed)
-    if (mass > 0.0_dp) self%root_of_changing = min(1.0_dp, max(least_root, sqrt(mass/self%mass)))
-    if (self%criterion() > self%allowed) return
+    if (self%bound_by_rest > self%most_at_rest) then
+      self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations)
+      if (self%criterion() > self%allowed) return
+    end if
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
       ! bodies that hold by traction sway in waves that few iterations do not show
@@ -323,7 +314,7 @@ contains
     real(dp) :: residual, defect
 
     if (.not. self%is_assessed) call self%assess(problem, method, iteration, residual, defect)
-    if (.not. self%has_levels) call self%add_levels(problem)
+    if (.not. self%has_levels) call self%add_levels(problem, method)
   end subroutine velocity_error_complete
 
   !> Find whether velocities are exact where the residual is rounding, with v_global and the reactions evaluated. Rounding is

@@ -115,6 +115,17 @@ module gravier_kernel_table
       real(dp), intent(out) :: sums(6)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel
+    !> powers = y . w of each contact, with w and the tests y of `tests_kernel`: P - r, on_bodies and r - previous.
+    pure subroutine powers_kernel(pair, hot, weight, velocity, impulse, on_bodies, previous, powers)
+      import :: dp
+      implicit none
+      integer, intent(in), contiguous :: pair(:, :)
+      real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :)
+      !> (lanes, nc, blocks) [N s]
+      real(dp), intent(in), contiguous :: impulse(:, :, :), on_bodies(:, :, :), previous(:, :, :)
+      !> (lanes, 3, blocks) [J]
+      real(dp), intent(inout), contiguous :: powers(:, :, :)
+    end subroutine powers_kernel
   end interface
 
   type :: kernel_table_t
@@ -135,6 +146,7 @@ module gravier_kernel_table
     procedure(operator_kernel), pointer, nopass :: set_operators => null()
     procedure(residual_kernel), pointer, nopass :: residual => null()
     procedure(tests_kernel), pointer, nopass :: make_tests => null()
+    procedure(powers_kernel), pointer, nopass :: find_powers => null()
   end type kernel_table_t
 
 end module gravier_kernel_table

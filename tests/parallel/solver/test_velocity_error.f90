@@ -13,6 +13,7 @@ program test_velocity_error
   use gravier_kept_impulses, only: kept_impulses_t
   use gravier_test_impulses, only: test_impulses_t
   use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_islands, only: islands_t, find_islands
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   use gravier_layered_start, only: carry_loads
   use gravier_backoff, only: backoff_words
@@ -38,6 +39,8 @@ program test_velocity_error
   call test_attraction(4)
   call test_start(is_uneven=.false.)
   call test_start(is_uneven=.true.)
+  call test_islands(1)
+  call test_islands(4)
   call test_slow(1)
   call test_slow(4)
   call test_restless(1)
@@ -197,7 +200,7 @@ contains
     call check_close(velocity%bound_by_rest, expected, 1e-9_dp*expected, "C of a uniform velocity")
     ! the disk on the ground violates its law by what it falls with, the others by nothing
     call check_close(velocity%largest_violation, expected, 1e-9_dp*expected, "largest violation")
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     call check_equal(velocity%levels%most_depth, count, "depth")
     ! the power at the ground over 0.65 of its force is what all sink with
     call check_close(velocity%levels%error, expected/0.65_dp, 1e-9_dp*expected, "L of a uniform velocity")
@@ -228,6 +231,47 @@ contains
     call check_close(velocity%bound_by_rest, expected, 1e-9_dp*expected, "C of shifts")
     call sim%free()
   end subroutine test_share
+
+  !> A column in two parts, of which one has nine tenths of the impulses that carry it, and the other falls as it should: the mean over
+  !> both hides a part of the error of the one, which its island has by itself.
+  subroutine test_islands(n_subdomains)
+    integer, intent(in) :: n_subdomains
+    integer, parameter :: count = 23, cut = 11
+    real(dp), parameter :: expected = 0.1_dp*gravity*step
+    type(simulation_t) :: sim
+    type(velocity_error_t) :: velocity
+    type(islands_t) :: islands
+    real(dp) :: residual, defect
+    integer :: s, c, b, lower, first
+
+    call make(count, n_subdomains, sim)
+    call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
+    do s = 1, size(sim%problem%sub)
+      associate (sub => sim%problem%sub(s))
+        do c = 1, sub%n_contacts
+          lower = min(place(sim%problem, s, sub%pair(1, c), count), place(sim%problem, s, sub%pair(2, c), count))
+          sub%impulse(lane_of(c), 1, block_of(c)) = 0.9_dp*max(0, cut - lower)*mass*gravity*step
+          if (lower /= cut) cycle
+          sub%gap(c) = 2.0_dp*gravity*step**2
+          sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
+        end do
+      end associate
+    end do
+    call sim%problem%evaluate()
+    call find_islands(sim%problem, islands)
+    do s = 1, size(sim%problem%sub)
+      ! the island of the first body of a subdomain is 1, and so are those of the others on its side of the cut
+      first = place(sim%problem, s, 1, count)
+      do b = 1, sim%problem%sub(s)%n_bodies
+        call check((islands%part(s)%of_body(b) == 1) .eqv. ((place(sim%problem, s, b, count) > cut) .eqv. (first > cut)), &
+          & "island of disk "//to_text(place(sim%problem, s, b, count)))
+      end do
+    end do
+    call velocity%assess(sim%problem, sim%method, 0, residual, defect)
+    call check_close(velocity%projection, sqrt(real(cut, dp)/count)*expected, 1e-9_dp*expected, "Y of both parts")
+    call check_close(velocity%tests%project_islands(sim%problem, sim%method, 0), expected, 1e-9_dp*expected, "Y of the lower part")
+    call sim%free()
+  end subroutine test_islands
 
   !> Impulses that are wrong from contact to contact: all parts of the estimate are the same in one subdomain and in several.
   subroutine test_decomposition()
@@ -266,7 +310,7 @@ contains
     end do
     call sim%problem%evaluate()
     call velocity%assess(sim%problem, sim%method, 0, found(4), defect)
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     found(1) = velocity%projection
     found(2) = velocity%levels%error
     found(3) = velocity%largest_violation
@@ -287,7 +331,7 @@ contains
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call set_impulses(sim%problem, count, 1.0_dp)
     call velocity%assess(sim%problem, sim%method, 0, residual, defect)
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     call check(velocity%estimate() <= 1e-9_dp*gravity*step, "estimate of the exact impulses: "//to_text(velocity%estimate(), 3))
     call check(velocity%criterion() <= 1e-6_dp*gravity*step, "criterion of the exact impulses")
     call sim%free()
@@ -327,14 +371,14 @@ contains
     call check_close(velocity%projection, expected, 1e-9_dp*expected, "Y where contacts attract")
     ! a small Y and no levels: E is below C
     velocity%projection = 0.1_dp*expected
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     velocity%levels%error = 0.0_dp
     velocity%levels%fastest = 0.0_dp
     call check_close(velocity%estimate(), expected, 1e-9_dp*expected, "the estimate is C before waves have come back")
     call check_close(velocity%criterion(), expected, 1e-9_dp*expected, "and what ends a solve is no less")
     call velocity%assess(sim%problem, sim%method, 2*count, residual, defect)
     velocity%projection = 0.1_dp*expected
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     velocity%levels%error = 0.0_dp
     call check_close(velocity%estimate(), 0.32_dp*expected, 1e-9_dp*expected, "and E afterwards")
     call sim%free()
@@ -390,7 +434,7 @@ contains
     call velocity%start(sim%problem, 0.1_dp*sim%problem%error_scale)
     call set_impulses(sim%problem, count, 0.9_dp)
     call velocity%assess(sim%problem, sim%method, 0, residual, defect)
-    call velocity%add_levels(sim%problem)
+    call velocity%add_levels(sim%problem, sim%method)
     call check(velocity%criterion() > 1.5_dp*velocity%estimate(), "the criterion is more than the estimate")
     call check_close(velocity%measure_of_start(), merge(velocity%criterion(), velocity%estimate(), is_uneven), 0.0_dp, &
       & "what a start is judged by")
@@ -443,7 +487,7 @@ contains
         end associate
       end do
       call velocity%assess(sim%problem, sim%method, 100, residual, defect)
-      call velocity%add_levels(sim%problem)
+      call velocity%add_levels(sim%problem, sim%method)
       call check_close(velocity%levels%fastest_body, merge(count, 1, k == 1)*sinks, 1e-6_dp*sinks, &
         & "how fast bodies sink, case "//to_text(k))
     end do

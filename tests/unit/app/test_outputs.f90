@@ -3,7 +3,7 @@
 program test_outputs
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, text_from
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_csv_table, only: csv_table_t
   use gravier_hdf5_file, only: h5_file_t
@@ -144,7 +144,7 @@ contains
         words = words//" bodies"
       end select
     end do
-    words = words(2:)
+    words = text_from(words, 2)
   end function wanted_by
 
   !> Open the output of a place in the registry, and close it: its stage and the steps in which it is due.

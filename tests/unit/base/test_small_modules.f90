@@ -11,7 +11,7 @@ program test_small_modules
   use gravier_room, only: free_memory
   use gravier_boundary, only: boundary_t
   use gravier_facing_planes, only: find_facing_planes
-  use gravier_disjoint_sets, only: first_of
+  use gravier_disjoint_sets, only: first_of, join_sets, number_sets
   use gravier_test_scenes, only: plane, change_shape
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -22,9 +22,33 @@ program test_small_modules
   call check_heap()
   call check_facing_planes()
   call check(first_of(4, [1, 1, 3, 2]) == 1 .and. first_of(3, [1, 1, 3, 2]) == 3, "the first of a set")
+  call check_sets()
   call finish_checks()
 
 contains
+
+  !> Six numbers, of which pairs are joined in two orders.
+  subroutine check_sets()
+    integer :: before(6), first(6), n_sets, k
+
+    do k = 1, size(before)
+      before(k) = k
+    end do
+    call join_sets(6, 4, before)
+    call join_sets(2, 5, before)
+    call join_sets(5, 6, before)
+    call join_sets(4, 2, before)
+    do k = 1, size(before)
+      first(k) = first_of(k, before)
+    end do
+    call check(all(first == [1, 2, 3, 2, 2, 2]), "sets joined two by two")
+    call number_sets(before, n_sets)
+    call check_equal(n_sets, 3, "number of sets")
+    call check(all(before == [1, 2, 3, 2, 2, 2]), "numbers of sets")
+    before(:) = [1, 1, 3, 3, 3, 6]
+    call number_sets(before, n_sets)
+    call check(all(before == [1, 1, 2, 2, 2, 3]), "sets are numbered by their first numbers")
+  end subroutine check_sets
 
   subroutine check_magnitudes()
     real(dp) :: infinity

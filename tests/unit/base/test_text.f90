@@ -4,7 +4,7 @@ program test_text
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t, raise, status_input, status_failure
   use gravier_random_hash, only: hash_uniform
-  use gravier_text, only: to_text, times_text, counted, lower, growing_text_t
+  use gravier_text, only: to_text, times_text, counted, lower, growing_text_t, text_from
   use gravier_check, only: check, check_equal, finish_checks
   implicit none
 
@@ -46,6 +46,8 @@ contains
 
   subroutine test_integers()
     call check_text(to_text(0), "0", "zero")
+    call check_text(text_from(", and so on", 3), "and so on", "a text from its third character on")
+    call check_text(text_from("ab", 3), "", "a text from behind its end")
     call check_text(to_text(-7), "-7", "negative")
     call check_text(to_text(huge(1)), "2147483647", "largest default integer")
     call check_text(to_text(-huge(1) - 1), "-2147483648", "smallest default integer")

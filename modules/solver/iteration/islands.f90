@@ -1,0 +1,193 @@
+!> Islands: the bodies that contacts join. Contacts with what is prescribed join nothing, so that no impulse of one island has an
+!> effect on another within a step.
+!>
+!> A mean over all bodies hides what is wrong in a small island beside large ones. What is summed over the contacts and bodies of
+!> each island by itself does not.
+module gravier_islands
+  use gravier_kinds, only: dp, i8
+  use gravier_timers, only: start_timer, stop_timer, phase_reduction
+  use gravier_narrow, only: narrow
+  use gravier_disjoint_sets, only: join_sets, number_sets
+  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_ways, only: is_closed, closing_shift
+  implicit none
+  private
+  public :: islands_t, island_sums_t, find_islands
+
+  !> Islands that lie in several subdomains are summed in so many places at most, and in `places_a_piece` for each of their pieces.
+  !> Those that share a place, which the remainders of their identifiers are, count as one.
+  integer, parameter :: most_places = 61, places_a_piece = 4
+
+  !> The islands of one subdomain: those that lie in several have a piece in each.
+  type :: island_part_t
+    !> number of islands and pieces
+    integer :: n = 0
+    !> island of each body (n_bodies)
+    integer, allocatable :: of_body(:)
+    !> place at which an island in several subdomains is summed, 0 of one that lies in this alone (n)
+    integer, allocatable, private :: place(:)
+  end type island_part_t
+
+  !> Sums over the islands of one subdomain.
+  type :: island_sums_t
+    !> (sums, islands)
+    real(dp), allocatable :: value(:, :)
+  end type island_sums_t
+
+  type :: islands_t
+    !> one a subdomain of this rank
+    type(island_part_t), allocatable :: part(:)
+    !> places at which islands in several subdomains are summed
+    integer, private :: n_places = 0
+  contains
+    procedure :: of_contact => islands_of_contact
+    procedure :: complete => islands_complete
+  end type islands_t
+
+contains
+
+  !> Find the islands of a problem. A contact joins two bodies that can move where it presses, or where it is closed. Collective.
+  subroutine find_islands(problem, islands)
+    type(contact_problem_t), intent(inout) :: problem
+    type(islands_t), intent(out) :: islands
+    integer :: s
+
+    allocate (islands%part(size(problem%sub)))
+    do s = 1, size(problem%sub)
+      call join_bodies(problem%sub(s), problem%kernels%row%shift, closing_shift(problem), islands%part(s))
+    end do
+    if (problem%n_subdomains > 1) call find_places(problem, islands)
+  end subroutine find_islands
+
+  !> The islands of a subdomain.
+  subroutine join_bodies(sub, at, closed, part)
+    type(subproblem_t), intent(in) :: sub
+    !> as of `is_closed`
+    integer, intent(in) :: at
+    real(dp), intent(in) :: closed
+    type(island_part_t), intent(out) :: part
+    integer :: b, c
+
+    allocate (part%of_body(sub%n_bodies))
+    do b = 1, sub%n_bodies
+      part%of_body(b) = b
+    end do
+    do c = 1, sub%n_contacts
+      if (maxval(sub%pair(:, c)) > sub%n_bodies) cycle
+      if (.not. is_closed(sub, at, closed, c)) cycle
+      call join_sets(sub%pair(1, c), sub%pair(2, c), part%of_body)
+    end do
+    call number_sets(part%of_body, part%n)
+    allocate (part%place(part%n), source=0)
+  end subroutine join_bodies
+
+  !> Places of the islands that lie in several subdomains, by the least identifier of the bodies that these share. Collective.
+  subroutine find_places(problem, islands)
+    type(contact_problem_t), intent(inout) :: problem
+    type(islands_t), intent(inout) :: islands
+    type :: labels_t
+      !> least identifier of each island, huge of one that lies in this subdomain alone (islands)
+      real(dp), allocatable :: of_island(:)
+    end type labels_t
+    type(labels_t) :: label(size(islands%part))
+    real(dp), allocatable :: field(:, :)
+    integer(i8) :: pieces(1)
+    integer :: s, b, i, j
+    logical :: changed
+
+    do s = 1, size(label)
+      associate (part => islands%part(s), shared => problem%shared%part(s), sub => problem%sub(s))
+        allocate (label(s)%of_island(part%n), source=huge(1.0_dp))
+        do j = 1, shared%n_shared
+          b = shared%body(j)
+          i = part%of_body(b)
+          label(s)%of_island(i) = min(label(s)%of_island(i), real(sub%id(b), dp))
+        end do
+      end associate
+    end do
+    do
+      do s = 1, size(label)
+        associate (part => islands%part(s), shared => problem%shared%part(s))
+          allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+          do j = 1, shared%n_shared
+            field(1, shared%body(j)) = label(s)%of_island(part%of_body(shared%body(j)))
+          end do
+          call problem%shared%load(s, field)
+          deallocate (field)
+        end associate
+      end do
+      call problem%shared%pass()
+      changed = .false.
+      do s = 1, size(label)
+        associate (part => islands%part(s), shared => problem%shared%part(s))
+          do j = 1, shared%n_slots
+            i = part%of_body(shared%slot_body(j))
+            if (.not. shared%recv(1, j) < label(s)%of_island(i)) cycle
+            label(s)%of_island(i) = shared%recv(1, j)
+            changed = .true.
+          end do
+        end associate
+      end do
+      if (.not. problem%comm%any_true(changed)) exit
+    end do
+    pieces(1) = 0
+    do s = 1, size(label)
+      pieces(1) = pieces(1) + count(label(s)%of_island < huge(1.0_dp))
+    end do
+    call problem%comm%sum_counts(pieces)
+    islands%n_places = narrow(min(places_a_piece*pieces(1), int(most_places, i8)))
+    do s = 1, size(label)
+      do i = 1, islands%part(s)%n
+        if (label(s)%of_island(i) < huge(1.0_dp)) islands%part(s)%place(i) = 1 + &
+          & narrow(modulo(nint(label(s)%of_island(i), i8), int(islands%n_places, i8)))
+      end do
+    end do
+  end subroutine find_places
+
+  !> The island of contact `c` of a subdomain, 0 where none of its bodies can move.
+  pure integer function islands_of_contact(self, s, sub, c) result(island)
+    class(islands_t), intent(in) :: self
+    !> number of the subdomain on this rank
+    integer, intent(in) :: s
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c
+    integer :: b
+
+    island = 0
+    b = minval(sub%pair(:, c))
+    if (b <= sub%n_bodies) island = self%part(s)%of_body(b)
+  end function islands_of_contact
+
+  !> Complete sums over islands that lie in several subdomains: each of their pieces gets those of the whole. Collective.
+  subroutine islands_complete(self, problem, n, sums)
+    class(islands_t), intent(in) :: self
+    type(contact_problem_t), intent(in) :: problem
+    !> sums of an island
+    integer, intent(in) :: n
+    !> of the subdomains of this rank, which may have none
+    type(island_sums_t), intent(inout) :: sums(:)
+    !> (sums and places, subdomains)
+    real(dp), allocatable :: parts(:, :), total(:)
+    integer :: s, i, at
+
+    if (self%n_places == 0) return
+    allocate (parts(n*self%n_places, size(sums)), source=0.0_dp)
+    allocate (total(n*self%n_places))
+    do s = 1, size(sums)
+      do i = 1, self%part(s)%n
+        at = n*(self%part(s)%place(i) - 1)
+        if (at >= 0) parts(at + 1:at + n, s) = parts(at + 1:at + n, s) + sums(s)%value(:, i)
+      end do
+    end do
+    call start_timer(phase_reduction)
+    call problem%comm%sum_parts(parts, total)
+    call stop_timer(phase_reduction)
+    do s = 1, size(sums)
+      do i = 1, self%part(s)%n
+        at = n*(self%part(s)%place(i) - 1)
+        if (at >= 0) sums(s)%value(:, i) = total(at + 1:at + n)
+      end do
+    end do
+  end subroutine islands_complete
+
+end module gravier_islands
