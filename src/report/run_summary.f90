@@ -97,7 +97,9 @@ contains
         text = "a larger &solver fallback_contacts, now "//to_text(solver%fallback_contacts)// &
           & ": Newton's method takes over solves of so many contacts at most"
       else
-        text = "a smaller &time step, or contacts that yield (&law kind = 'elastic')"
+        text = "contacts that yield (&law kind = 'elastic')"
+        ! with rolling resistance a step of a hundredth part stagnates just as well
+        if (.not. simulation%effects%rolling) text = "a smaller &time step, or "//text
         if (solver%method /= "newton" .and. .not. simulation%effects%rolling) text = "&solver method = 'newton', "//text
       end if
     end associate

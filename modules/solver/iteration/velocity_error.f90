@@ -195,7 +195,8 @@ contains
 
   !> What is compared with the error that is allowed [m/s]: E with a larger factor of L, or C over a fraction of that error. What
   !> sinks as one creeps on with one sign from step to step, so that less of it is allowed. No contact may violate its law by much,
-  !> no body sink by much, and no island be wrong by more than all may be. What moves where nearly all bodies are at rest has to be known better.
+  !> no body sink by much, and no island be wrong by more than all may be. What moves where nearly all bodies are at rest has to be
+  !> known better.
   pure real(dp) function velocity_error_criterion(self) result(criterion)
     class(velocity_error_t), intent(in) :: self
     criterion = max(self%largest_violation/violations_allowed, &

@@ -105,6 +105,18 @@ contains
       simulation%tally%unbounded = round
       call check((index(mending_text(simulation), "more room") > 0) .eqv. round == 1, "more room where a solve has no solution")
     end do
+    ! all have stagnated, and the method is Newton's: a smaller step helps but where moments resist rolling
+    simulation%tally%stagnated = 4
+    simulation%tally%exhausted = 0
+    simulation%tally%unbounded = 0
+    simulation%config%solver%method = "newton"
+    simulation%fallback%taken = simulation%tally%stagnated
+    simulation%fallback%solved = 0
+    do round = 0, 1
+      simulation%effects%rolling = round == 1
+      call check((index(mending_text(simulation), "smaller &time step") > 0) .eqv. round == 0, "a smaller step but with rolling")
+      call check(index(mending_text(simulation), "contacts that yield") > 0, "contacts that yield where solves stagnate")
+    end do
     call simulation%free()
   end subroutine test_misses
 
