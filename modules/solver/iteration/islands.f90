@@ -8,11 +8,12 @@ module gravier_islands
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_narrow, only: narrow
   use gravier_disjoint_sets, only: join_sets, number_sets
+  use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_ways, only: is_closed, closing_shift
   implicit none
   private
-  public :: islands_t, island_sums_t, find_islands
+  public :: islands_t, island_part_t, island_sums_t, find_islands
 
   !> Islands that lie in several subdomains are summed in so many places at most, and in `places_a_piece` for each of their pieces.
   !> Those that share a place, which the remainders of their identifiers are, count as one.
@@ -24,6 +25,10 @@ module gravier_islands
     integer :: n = 0
     !> island of each body (n_bodies)
     integer, allocatable :: of_body(:)
+    !> mass of the bodies of each island, in all subdomains (n) [kg]
+    real(dp), allocatable :: mass(:)
+    !> whether an island is one of those that sums are formed over (n)
+    logical, allocatable :: is_small(:)
     !> place at which an island in several subdomains is summed, 0 of one that lies in this alone (n)
     integer, allocatable, private :: place(:)
   end type island_part_t
@@ -50,6 +55,7 @@ contains
   subroutine find_islands(problem, islands)
     type(contact_problem_t), intent(inout) :: problem
     type(islands_t), intent(out) :: islands
+    type(island_sums_t) :: mass(size(problem%sub))
     integer :: s
 
     allocate (islands%part(size(problem%sub)))
@@ -57,6 +63,13 @@ contains
       call join_bodies(problem%sub(s), problem%kernels%row%shift, closing_shift(problem), islands%part(s))
     end do
     if (problem%n_subdomains > 1) call find_places(problem, islands)
+    do s = 1, size(mass)
+      call add_masses(problem%sub(s), problem%kernels%nd, islands%part(s), mass(s))
+    end do
+    call islands%complete(problem, 1, mass)
+    do s = 1, size(mass)
+      islands%part(s)%mass = mass(s)%value(1, :)
+    end do
   end subroutine find_islands
 
   !> The islands of a subdomain.
@@ -80,6 +93,27 @@ contains
     call number_sets(part%of_body, part%n)
     allocate (part%place(part%n), source=0)
   end subroutine join_bodies
+
+  !> The masses of the islands of a subdomain, a copy of a shared body counting with its part.
+  pure subroutine add_masses(sub, nd, part, mass)
+    type(subproblem_t), intent(in) :: sub
+    !> 2 or 3
+    integer, intent(in) :: nd
+    type(island_part_t), intent(in) :: part
+    !> of one sum [kg]
+    type(island_sums_t), intent(inout) :: mass
+    real(dp) :: inverse
+    integer :: b
+
+    allocate (mass%value(1, part%n), source=0.0_dp)
+    do b = 1, sub%n_bodies
+      inverse = inverse_of_translation(sub%inverse_mass(:, b), nd)
+      if (.not. inverse > 0.0_dp) cycle
+      associate (total => mass%value(1, part%of_body(b)))
+        total = total + 1.0_dp/(inverse*sub%multiplicity(b))
+      end associate
+    end do
+  end subroutine add_masses
 
   !> Places of the islands that lie in several subdomains, by the least identifier of the bodies that these share. Collective.
   subroutine find_places(problem, islands)

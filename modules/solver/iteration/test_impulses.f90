@@ -22,7 +22,7 @@ module gravier_test_impulses
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
   use gravier_kept_impulses, only: kept_impulses_t
-  use gravier_islands, only: islands_t, island_sums_t, find_islands
+  use gravier_islands, only: islands_t, island_part_t, island_sums_t, find_islands
   implicit none
   private
   public :: test_impulses_t, projection_t
@@ -36,8 +36,11 @@ module gravier_test_impulses
   !> test impulses make
   integer, parameter :: n_tests = 3, at_powers = n_residual_sums, at_products = at_powers + n_tests, &
     & n_products = n_tests*(n_tests + 1)/2, n_sums = at_products + n_products
-  !> sums over an island: the powers, the products, its mass and what bounds its error where rest is admissible
-  integer, parameter :: at_mass = n_tests + n_products + 1, at_rest = at_mass + 1, n_island_sums = at_rest
+  !> rounding of a sum of impulses that balance each other, over these; part of the mass of all grains in contact from which on an
+  !> island is not looked at by itself
+  real(dp), parameter :: rounding = 1.0e-12_dp, most_of_mass = 0.5_dp
+  !> sums over an island: the powers, the products, its mass, what bounds its error where rest is admissible, and r . W r
+  integer, parameter :: at_mass = n_tests + n_products + 1, at_rest = at_mass + 1, at_terms = at_rest + 1, n_island_sums = at_terms
 
   !> What is held for one subdomain.
   type :: test_part_t
@@ -190,18 +193,20 @@ contains
     call stop_timer(phase_reduction)
     call problem%take_residual(sums(1:n_residual_sums), found%residual, found%defect)
     if (problem%cell%is_driven) call add_cell(problem, sums(n_sums + 1:), sums(at_products + 1:n_sums))
-    found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:n_sums))
+    found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:n_sums), 0.0_dp)
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
 
-  !> The largest error of an island by its own projection, after `project` [m/s]: Y of its bodies over the root of their mass, or
-  !> the bound by rest where that is smaller. Collective.
-  real(dp) function test_impulses_project_islands(self, problem, method, iteration) result(error)
+  !> The largest error of an island by its own projection, after `project` [m/s]: Y over the root of the mass, or the bound by rest
+  !> where that is smaller. The mean over all bodies tells that of an island with most of the mass, which has no part. Collective.
+  real(dp) function test_impulses_project_islands(self, problem, method, iteration, mass) result(error)
     class(test_impulses_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
     class(method_t), intent(in) :: method
     !> that of `project`
     integer, intent(in) :: iteration
+    !> of the grains in contact [kg]
+    real(dp), intent(in) :: mass
     type(islands_t) :: islands
     type(island_sums_t) :: sums(size(problem%sub))
     real(dp) :: square
@@ -209,6 +214,7 @@ contains
 
     call find_islands(problem, islands)
     do s = 1, size(sums)
+      islands%part(s)%is_small = islands%part(s)%mass < most_of_mass*mass
       allocate (sums(s)%value(n_island_sums, islands%part(s)%n), source=0.0_dp)
       if (method%acceleration%extrapolates() .and. iteration > 0) then
         call add_contacts(self, problem, islands, s, method%acceleration%part(s)%impulse, sums(s)%value)
@@ -218,10 +224,9 @@ contains
         call add_contacts(self, problem, islands, s, problem%sub(s)%impulse, sums(s)%value)
       end if
       if (allocated(self%part(s)%load)) then
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), self%part(s)%load, islands%part(s)%of_body, sums(s)%value)
+        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), self%part(s)%load, islands%part(s), sums(s)%value)
       else
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), problem%sub(s)%reaction, islands%part(s)%of_body, &
-          & sums(s)%value)
+        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), problem%sub(s)%reaction, islands%part(s), sums(s)%value)
       end if
     end do
     call islands%complete(problem, n_island_sums, sums)
@@ -230,7 +235,7 @@ contains
       do i = 1, islands%part(s)%n
         associate (value => sums(s)%value(:, i))
           if (.not. value(at_mass) > 0.0_dp) cycle
-          square = projection_of(value(1:n_tests), value(n_tests + 1:at_mass - 1))
+          square = projection_of(value(1:n_tests), value(n_tests + 1:at_mass - 1), rounding**2*value(at_terms))
           if (problem%rest_is_admissible) square = min(square, max(0.0_dp, value(at_rest)))
           error = max(error, square/value(at_mass))
         end associate
@@ -263,22 +268,30 @@ contains
       !> impulses on the bodies
       real(dp), intent(in), contiguous :: on_bodies(:, :, :)
       !> blocks of contacts that are looked at together
-      integer, parameter :: together = 64
-      real(dp) :: powers(lanes, n_tests, together)
-      integer :: from, to, c, i, q, g
+      integer, parameter :: together = 4
+      real(dp) :: powers(lanes, n_tests + 1, together)
+      integer :: from, to, c, i, q, g, island(lanes*together)
 
       associate (sub => problem%sub(s), shift => problem%kernels%row%shift)
         do from = 1, size(sub%hot, 3), together
           to = min(from + together - 1, size(sub%hot, 3))
+          island(:) = 0
+          do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
+            i = islands%of_contact(s, sub, c)
+            if (i == 0) cycle
+            if (islands%part(s)%is_small(i)) island(c - (from - 1)*lanes) = i
+          end do
+          if (.not. any(island > 0)) cycle
           call problem%kernels%find_powers(sub%pair(:, (from - 1)*lanes + 1:to*lanes), sub%hot(:, :, from:to), &
             & sub%inverse_mass, sub%v_global, sub%impulse(:, :, from:to), on_bodies(:, :, from:to), previous(:, :, from:to), &
             & powers(:, :, 1:to - from + 1))
           do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
-            i = islands%of_contact(s, sub, c)
+            i = island(c - (from - 1)*lanes)
             if (i == 0) cycle
             q = lane_of(c)
             g = block_of(c)
-            sums(1:n_tests, i) = sums(1:n_tests, i) + powers(q, :, g - from + 1)
+            sums(1:n_tests, i) = sums(1:n_tests, i) + powers(q, 1:n_tests, g - from + 1)
+            sums(at_terms, i) = sums(at_terms, i) + powers(q, n_tests + 1, g - from + 1)
             sums(at_rest, i) = sums(at_rest, i) + 2.0_dp*sub%impulse(q, 1, g)*sub%hot(q, shift, g)
           end do
         end do
@@ -288,15 +301,14 @@ contains
   end subroutine add_contacts
 
   !> Add what the bodies of islands say: the products of the velocities of the tests, the mass, and the square of the velocity.
-  subroutine add_bodies(sub, nd, part, load, island, sums)
+  subroutine add_bodies(sub, nd, part, load, islands, sums)
     type(subproblem_t), intent(in) :: sub
     !> 2 or 3
     integer, intent(in) :: nd
     type(test_part_t), intent(in) :: part
     !> H of the impulses on the bodies (nv, n_columns) [N s, N m s]
     real(dp), intent(in), contiguous :: load(:, :)
-    !> of each body (n_bodies)
-    integer, intent(in), contiguous :: island(:)
+    type(island_part_t), intent(in) :: islands
     !> (n_island_sums, islands)
     real(dp), intent(inout), contiguous :: sums(:, :)
     real(dp) :: products(n_products), factor(1), mass
@@ -304,13 +316,14 @@ contains
 
     factor(1) = 1.0_dp
     do b = 1, sub%n_bodies
+      if (.not. islands%is_small(islands%of_body(b))) cycle
       mass = inverse_of_translation(sub%inverse_mass(:, b), nd)
       if (.not. mass > 0.0_dp) cycle
       if (allocated(sub%concern)) factor(1) = sub%concern(b)
       mass = factor(1)/(mass*sub%multiplicity(b))
       call inverse_products(sub%inverse_mass(:, b:b), sub%multiplicity(b:b), part%local(:, b:b), load(:, b:b), &
         & part%recent(:, b:b), products, factor)
-      i = island(b)
+      i = islands%of_body(b)
       sums(n_tests + 1:at_mass - 1, i) = sums(n_tests + 1:at_mass - 1, i) + products
       sums(at_mass, i) = sums(at_mass, i) + mass
       sums(at_rest, i) = sums(at_rest, i) + &
@@ -445,9 +458,11 @@ contains
 
   !> b^T G^+ b [J]: the tests are taken one after the other, next the one of which those taken have left most, as in a Cholesky
   !> factorisation with pivots. What little is left of a test that is nearly a sum of others counts as none.
-  pure real(dp) function projection_of(b, products) result(square)
+  pure real(dp) function projection_of(b, products, least) result(square)
     !> (n_tests); columns of the upper triangle of G
     real(dp), intent(in), contiguous :: b(:), products(:)
+    !> square of a velocity up to which a test counts as none [J]
+    real(dp), intent(in) :: least
     real(dp) :: left(n_tests, n_tests), power(n_tests), share(n_tests)
     integer :: i, j, k, at
 
@@ -462,7 +477,7 @@ contains
     power(:) = b
     share(:) = 0.0_dp
     do i = 1, n_tests
-      if (left(i, i) > 0.0_dp) share(i) = 1.0_dp/left(i, i)
+      if (left(i, i) > least) share(i) = 1.0_dp/left(i, i)
     end do
     square = 0.0_dp
     do k = 1, n_tests

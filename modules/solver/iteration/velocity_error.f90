@@ -289,7 +289,7 @@ contains
     self%believed_from = merge(early, 0, self%is_early .and. problem%carries)
     if (self%criterion() > self%allowed) return
     if (self%bound_by_rest > self%most_at_rest) then
-      self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations)
+      self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations, self%mass)
       if (self%criterion() > self%allowed) return
     end if
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)

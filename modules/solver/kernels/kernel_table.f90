@@ -115,7 +115,8 @@ module gravier_kernel_table
       real(dp), intent(out) :: sums(6)
       real(dp), intent(inout) :: largest
     end subroutine tests_kernel
-    !> powers = y . w of each contact, with w and the tests y of `tests_kernel`: P - r, on_bodies and r - previous.
+    !> powers = y . w of each contact, with w and the tests y of `tests_kernel`: P - r, on_bodies and r - previous; behind them
+    !> r . W r, with the undivided local operator W.
     pure subroutine powers_kernel(pair, hot, weight, velocity, impulse, on_bodies, previous, powers)
       import :: dp
       implicit none
@@ -123,7 +124,7 @@ module gravier_kernel_table
       real(dp), intent(in), contiguous :: hot(:, :, :), weight(:, :), velocity(:, :)
       !> (lanes, nc, blocks) [N s]
       real(dp), intent(in), contiguous :: impulse(:, :, :), on_bodies(:, :, :), previous(:, :, :)
-      !> (lanes, 3, blocks) [J]
+      !> (lanes, 4, blocks) [J]
       real(dp), intent(inout), contiguous :: powers(:, :, :)
     end subroutine powers_kernel
   end interface

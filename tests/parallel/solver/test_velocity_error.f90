@@ -232,8 +232,8 @@ contains
     call sim%free()
   end subroutine test_share
 
-  !> A column in two parts, of which one has nine tenths of the impulses that carry it, and the other falls as it should: the mean over
-  !> both hides a part of the error of the one, which its island has by itself.
+  !> A column in two parts, of which one has nine tenths of the impulses that carry it, and the other falls as it should. The mean
+  !> over both hides a part of the error of the one, which its island has by itself.
   subroutine test_islands(n_subdomains)
     integer, intent(in) :: n_subdomains
     integer, parameter :: count = 23, cut = 11
@@ -241,7 +241,7 @@ contains
     type(simulation_t) :: sim
     type(velocity_error_t) :: velocity
     type(islands_t) :: islands
-    real(dp) :: residual, defect
+    real(dp) :: residual, defect, error
     integer :: s, c, b, lower, first
 
     call make(count, n_subdomains, sim)
@@ -262,6 +262,7 @@ contains
     do s = 1, size(sim%problem%sub)
       ! the island of the first body of a subdomain is 1, and so are those of the others on its side of the cut
       first = place(sim%problem, s, 1, count)
+      call check_close(islands%part(s)%mass(1), merge(count - cut, cut, first > cut)*mass, 1e-12_dp*mass, "mass of an island")
       do b = 1, sim%problem%sub(s)%n_bodies
         call check((islands%part(s)%of_body(b) == 1) .eqv. ((place(sim%problem, s, b, count) > cut) .eqv. (first > cut)), &
           & "island of disk "//to_text(place(sim%problem, s, b, count)))
@@ -269,7 +270,10 @@ contains
     end do
     call velocity%assess(sim%problem, sim%method, 0, residual, defect)
     call check_close(velocity%projection, sqrt(real(cut, dp)/count)*expected, 1e-9_dp*expected, "Y of both parts")
-    call check_close(velocity%tests%project_islands(sim%problem, sim%method, 0), expected, 1e-9_dp*expected, "Y of the lower part")
+    error = velocity%tests%project_islands(sim%problem, sim%method, 0, velocity%mass)
+    call check_close(error, expected, 1e-9_dp*expected, "Y of the lower part")
+    error = velocity%tests%project_islands(sim%problem, sim%method, 0, 1.9_dp*cut*mass)
+    call check_close(error, 0.0_dp, 1e-9_dp*expected, "no Y of parts with more than half of a mass")
     call sim%free()
   end subroutine test_islands
 
