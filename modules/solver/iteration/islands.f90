@@ -1,22 +1,22 @@
-!> Islands: the bodies that contacts join. Contacts with what is prescribed join nothing, so that no impulse of one island has an
-!> effect on another within a step.
+!> Islands: the bodies that impulses of contacts join. Contacts with what is prescribed join nothing, nor do contacts without an
+!> impulse, so that no impulse of one island has an effect on another.
 !>
 !> A mean over all bodies hides what is wrong in a small island beside large ones. What is summed over the contacts and bodies of
 !> each island by itself does not.
 module gravier_islands
   use gravier_kinds, only: dp, i8
+  use gravier_contact_kernels, only: lane_of, block_of
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_narrow, only: narrow
   use gravier_disjoint_sets, only: join_sets, number_sets
   use gravier_body_mass, only: inverse_of_translation
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
-  use gravier_ways, only: is_closed, closing_shift
   implicit none
   private
   public :: islands_t, island_part_t, island_sums_t, find_islands
 
   !> Islands that lie in several subdomains are summed in so many places at most, and in `places_a_piece` for each of their pieces.
-  !> Those that share a place, which the remainders of their identifiers are, count as one.
+  !> Those that share a place count as one.
   integer, parameter :: most_places = 61, places_a_piece = 4
 
   !> The islands of one subdomain: those that lie in several have a piece in each.
@@ -51,7 +51,7 @@ module gravier_islands
 
 contains
 
-  !> Find the islands of a problem. A contact joins two bodies that can move where it presses, or where it is closed. Collective.
+  !> Find the islands of a problem. A contact joins two bodies that can move where it has an impulse. Collective.
   subroutine find_islands(problem, islands)
     type(contact_problem_t), intent(inout) :: problem
     type(islands_t), intent(out) :: islands
@@ -60,7 +60,7 @@ contains
 
     allocate (islands%part(size(problem%sub)))
     do s = 1, size(problem%sub)
-      call join_bodies(problem%sub(s), problem%kernels%row%shift, closing_shift(problem), islands%part(s))
+      call join_bodies(problem%sub(s), islands%part(s))
     end do
     if (problem%n_subdomains > 1) call find_places(problem, islands)
     do s = 1, size(mass)
@@ -73,11 +73,8 @@ contains
   end subroutine find_islands
 
   !> The islands of a subdomain.
-  subroutine join_bodies(sub, at, closed, part)
+  subroutine join_bodies(sub, part)
     type(subproblem_t), intent(in) :: sub
-    !> as of `is_closed`
-    integer, intent(in) :: at
-    real(dp), intent(in) :: closed
     type(island_part_t), intent(out) :: part
     integer :: b, c
 
@@ -87,7 +84,7 @@ contains
     end do
     do c = 1, sub%n_contacts
       if (maxval(sub%pair(:, c)) > sub%n_bodies) cycle
-      if (.not. is_closed(sub, at, closed, c)) cycle
+      if (.not. abs(sub%impulse(lane_of(c), 1, block_of(c))) > 0.0_dp) cycle
       call join_sets(sub%pair(1, c), sub%pair(2, c), part%of_body)
     end do
     call number_sets(part%of_body, part%n)
@@ -173,10 +170,24 @@ contains
     do s = 1, size(label)
       do i = 1, islands%part(s)%n
         if (label(s)%of_island(i) < huge(1.0_dp)) islands%part(s)%place(i) = 1 + &
-          & narrow(modulo(nint(label(s)%of_island(i), i8), int(islands%n_places, i8)))
+          & narrow(modulo(mixed(nint(label(s)%of_island(i), i8)), int(islands%n_places, i8)))
       end do
     end do
   end subroutine find_places
+
+  !> A number made of an identifier, whose remainders are spread whatever the identifiers have in common.
+  pure integer(i8) function mixed(id)
+    integer(i8), intent(in) :: id
+    !> of the generator of Park and Miller
+    integer(i8), parameter :: multiplier = 48271_i8, prime = 2147483647_i8
+    integer :: k
+
+    mixed = id
+    do k = 1, 2
+      mixed = modulo(modulo(mixed, prime)*multiplier, prime)
+      mixed = ieor(mixed, shiftr(mixed, 13))
+    end do
+  end function mixed
 
   !> The island of contact `c` of a subdomain, 0 where none of its bodies can move.
   pure integer function islands_of_contact(self, s, sub, c) result(island)

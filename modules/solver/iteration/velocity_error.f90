@@ -12,7 +12,7 @@
 !> All are divided by the root of the mass. E is a mean by mass, which light bodies hide in. No contact may therefore violate its
 !> law by much, and no body sink by much onto what is below it. Where nearly all bodies are at rest and some are faster, these may
 !> roll or be in error: E has to be at most a third of what moves there. Where bodies move, 3.2 Y of each island of bodies that
-!> contacts join (gravier_islands), by its own mass, has to be within the error allowed, too. See doc/theory.md, section 24.
+!> impulses join (gravier_islands), by its own mass, has to be within the error allowed, too. See doc/theory.md, section 24.
 module gravier_velocity_error
   use gravier_kinds, only: dp
   use gravier_body_mass, only: inverse_of_translation, are_uneven
@@ -288,10 +288,6 @@ contains
     self%is_early = self%iterations < early .and. (problem%carries .or. self%bound_by_rest <= slow*problem%error_scale)
     self%believed_from = merge(early, 0, self%is_early .and. problem%carries)
     if (self%criterion() > self%allowed) return
-    if (self%bound_by_rest > self%most_at_rest) then
-      self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations, self%mass)
-      if (self%criterion() > self%allowed) return
-    end if
     limit = merge(bodies_allowed, body_allowed, self%is_uneven)
     if (self%bound_by_rest <= self%most_at_rest) then
       ! bodies that hold by traction sway in waves that few iterations do not show
@@ -300,6 +296,11 @@ contains
         & self%is_restless = fastest_speed(problem) > speed_at_rest*self%allowed
       if (self%criterion() > self%allowed) return
       if (self%is_restless) limit = speed_at_rest
+    end if
+    ! the motion of a cell that stresses drive joins all bodies
+    if ((self%is_restless .or. self%bound_by_rest > self%most_at_rest) .and. .not. problem%cell%is_driven) then
+      self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations, self%mass)
+      if (self%criterion() > self%allowed) return
     end if
     if (self%levels%fastest_body <= limit*self%allowed) return
     call self%levels%follow(problem, self%largest_violation)

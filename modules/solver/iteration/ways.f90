@@ -5,11 +5,11 @@
 !> way is a sum from its root on; nor on subdomains or ranks. What is prescribed hands on no way but its own.
 module gravier_ways
   use gravier_kinds, only: dp
-  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_contact_kernels, only: lanes
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   implicit none
   private
-  public :: ways_t, list_closed, shorten_ways, unreached, is_closed, closing_shift
+  public :: ways_t, list_closed, shorten_ways, unreached
 
   !> length of the way of what none leads to
   real(dp), parameter :: unreached = huge(1.0_dp)
@@ -46,7 +46,7 @@ contains
     integer, allocatable :: pair(:, :)
     real(dp), allocatable :: step(:)
 
-    closed = closing_shift(problem)
+    closed = max(rounded*problem%velocity_scale, soon_closed*problem%error_scale)
     do s = 1, size(ways)
       associate (sub => problem%sub(s))
         allocate (ways(s)%length(sub%n_columns), source=unreached)
@@ -60,26 +60,6 @@ contains
       end associate
     end do
   end subroutine list_closed
-
-  !> Shift up to which a contact counts as closed [m/s].
-  pure real(dp) function closing_shift(problem)
-    type(contact_problem_t), intent(in) :: problem
-    closing_shift = max(rounded*problem%velocity_scale, soon_closed*problem%error_scale)
-  end function closing_shift
-
-  !> Whether contact `c` of a subdomain presses or is closed.
-  pure logical function is_closed(sub, at, closed, c)
-    type(subproblem_t), intent(in) :: sub
-    !> row of the contact data that holds the shift
-    integer, intent(in) :: at
-    !> shift up to which a contact counts as closed [m/s]
-    real(dp), intent(in) :: closed
-    integer, intent(in) :: c
-
-    is_closed = .not. sub%gap(c) > 0.0_dp
-    if (.not. is_closed) is_closed = .not. sub%hot(lane_of(c), at, block_of(c)) > closed .or. &
-      & sub%impulse(lane_of(c), 1, block_of(c)) > 0.0_dp
-  end function is_closed
 
   !> The contacts of a subdomain that press or are closed.
   pure subroutine take_closed(sub, at, closed, n, pair, step, unit)
@@ -102,7 +82,7 @@ contains
     do g = 1, size(sub%hot, 3)
       do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
         c = (g - 1)*lanes + q
-        if (.not. is_closed(sub, at, closed, c)) cycle
+        if (sub%gap(c) > 0.0_dp .and. sub%hot(q, at, g) > closed .and. .not. sub%impulse(q, 1, g) > 0.0_dp) cycle
         n = n + 1
         pair(:, n) = sub%pair(:, c)
         step(n) = 1.0_dp

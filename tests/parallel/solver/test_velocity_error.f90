@@ -250,8 +250,11 @@ contains
       associate (sub => sim%problem%sub(s))
         do c = 1, sub%n_contacts
           lower = min(place(sim%problem, s, sub%pair(1, c), count), place(sim%problem, s, sub%pair(2, c), count))
-          sub%impulse(lane_of(c), 1, block_of(c)) = 0.9_dp*max(0, cut - lower)*mass*gravity*step
+          ! on the disks above, so small impulses that they are nothing but what joins them
+          sub%impulse(lane_of(c), 1, block_of(c)) = merge(0.9_dp*(cut - lower), 1.0e-20_dp, lower < cut)*mass*gravity*step
           if (lower /= cut) cycle
+          ! the contact of both parts is open
+          sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
           sub%gap(c) = 2.0_dp*gravity*step**2
           sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
         end do
