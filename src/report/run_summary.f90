@@ -98,7 +98,7 @@ contains
           & ": Newton's method takes over solves of so many contacts at most"
       else
         text = "contacts that yield (&law kind = 'elastic')"
-        ! with rolling resistance a step of a hundredth part stagnates just as well
+        ! solves with rolling resistance stagnate with a hundredth of the step, too
         if (.not. simulation%effects%rolling) text = "a smaller &time step, or "//text
         if (solver%method /= "newton" .and. .not. simulation%effects%rolling) text = "&solver method = 'newton', "//text
       end if

@@ -10,7 +10,7 @@ module gravier_creeping_groups
   use gravier_body_mass, only: apply_inverse_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
-  use gravier_disjoint_sets, only: first_of
+  use gravier_disjoint_sets, only: first_of, join_sets
   implicit none
   private
   public :: creep_t, find_creep
@@ -191,7 +191,7 @@ contains
       if (force(problem, sub%impulse, c) < least) cycle
       i = group_of(sub%pair(1, c))
       j = group_of(sub%pair(2, c))
-      if (min(i, j) > 0) first(max(i, j)) = min(i, j)
+      if (min(i, j) > 0) call join_sets(i, j, first)
     end do
     do b = 1, sub%n_grains
       first(b) = group_of(b)

@@ -27,7 +27,7 @@ module gravier_islands
     integer, allocatable :: of_body(:)
     !> mass of the bodies of each island, in all subdomains (n) [kg]
     real(dp), allocatable :: mass(:)
-    !> whether an island is one of those that sums are formed over (n)
+    !> whether that is less than what `find_islands` was given (n)
     logical, allocatable :: is_small(:)
     !> place at which an island in several subdomains is summed, 0 of one that lies in this alone (n)
     integer, allocatable, private :: place(:)
@@ -52,8 +52,10 @@ module gravier_islands
 contains
 
   !> Find the islands of a problem. A contact joins two bodies that can move where it has an impulse. Collective.
-  subroutine find_islands(problem, islands)
+  subroutine find_islands(problem, most, islands)
     type(contact_problem_t), intent(inout) :: problem
+    !> mass below which an island is small [kg]
+    real(dp), intent(in) :: most
     type(islands_t), intent(out) :: islands
     type(island_sums_t) :: mass(size(problem%sub))
     integer :: s
@@ -69,6 +71,7 @@ contains
     call islands%complete(problem, 1, mass)
     do s = 1, size(mass)
       islands%part(s)%mass = mass(s)%value(1, :)
+      islands%part(s)%is_small = islands%part(s)%mass < most
     end do
   end subroutine find_islands
 

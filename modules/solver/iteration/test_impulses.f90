@@ -212,9 +212,8 @@ contains
     real(dp) :: square
     integer :: s, i
 
-    call find_islands(problem, islands)
+    call find_islands(problem, most_of_mass*mass, islands)
     do s = 1, size(sums)
-      islands%part(s)%is_small = islands%part(s)%mass < most_of_mass*mass
       allocate (sums(s)%value(n_island_sums, islands%part(s)%n), source=0.0_dp)
       if (method%acceleration%extrapolates() .and. iteration > 0) then
         call add_contacts(self, problem, islands, s, method%acceleration%part(s)%impulse, sums(s)%value)

@@ -261,11 +261,12 @@ contains
       end associate
     end do
     call sim%problem%evaluate()
-    call find_islands(sim%problem, islands)
+    call find_islands(sim%problem, 11.5_dp*mass, islands)
     do s = 1, size(sim%problem%sub)
       ! the island of the first body of a subdomain is 1, and so are those of the others on its side of the cut
       first = place(sim%problem, s, 1, count)
       call check_close(islands%part(s)%mass(1), merge(count - cut, cut, first > cut)*mass, 1e-12_dp*mass, "mass of an island")
+      call check(islands%part(s)%is_small(1) .eqv. first <= cut, "the lower part is the small one")
       do b = 1, sim%problem%sub(s)%n_bodies
         call check((islands%part(s)%of_body(b) == 1) .eqv. ((place(sim%problem, s, b, count) > cut) .eqv. (first > cut)), &
           & "island of disk "//to_text(place(sim%problem, s, b, count)))

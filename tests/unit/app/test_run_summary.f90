@@ -105,7 +105,7 @@ contains
       simulation%tally%unbounded = round
       call check((index(mending_text(simulation), "more room") > 0) .eqv. round == 1, "more room where a solve has no solution")
     end do
-    ! all have stagnated, and the method is Newton's: a smaller step helps but where moments resist rolling
+    ! all solves have stagnated, and no other method is left: a smaller step is offered, but not with rolling resistance
     simulation%tally%stagnated = 4
     simulation%tally%exhausted = 0
     simulation%tally%unbounded = 0
