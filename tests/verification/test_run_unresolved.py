@@ -12,9 +12,9 @@ DEFAULTS = {"criterion": "velocity_error", "tolerance": 1e-2, "check_every": 10,
 
 class Unresolved(SmallScene):
 
-    def press(self, title, status=0, **solver):
-        """A column of disks under a lid whose force grows from 0 to 2 kN in a second."""
-        column = [Grain([0.0, RADIUS * (2 * k + 1)], radius=RADIUS) for k in range(COUNT)]
+    def press(self, title, status=0, wind=0.0, **solver):
+        """A column of disks, which moves sideways, under a lid whose force grows from 0 to 2 kN in a second."""
+        column = [Grain([0.0, RADIUS * (2 * k + 1)], [wind, 0.0], radius=RADIUS) for k in range(COUNT)]
         floor = plane([0.0, 0.0], [0.0, 1.0], name="floor")
         lid = plane([0.0, 2 * COUNT * RADIUS], [0.0, -1.0], name="lid", free=[False, True], mass=0.7, table="force.csv")
         record = self.play(title, column, [floor, lid], (0.0, 0.0), STEPS, files={"force.csv": "time,fy\n0,0\n1,-2000\n"}, status=status,
@@ -37,6 +37,13 @@ class Unresolved(SmallScene):
         self.assertNotIn("\ndrift ", record.run.stdout)
         self.assertNotIn("see `drift`", record.run.stdout)
         self.assertLess(down, 0.02 * RADIUS)
+
+    def test_moving_as_a_whole(self):
+        """The lid stays, too, where the column moves past it and past the floor."""
+        record, down = self.press("carried", wind=1.0)
+        self.assertIn("\nrefined ", record.run.stdout)
+        self.assertNotIn("\ndrift ", record.run.stdout)
+        self.assertLess(down, 0.05 * RADIUS)
 
     def test_told(self):
         """Solves that end by their residual aim at nothing else. The lid comes down, though nothing gives way, and the line `drift` says how far

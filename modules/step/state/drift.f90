@@ -2,6 +2,10 @@
 !> errors of one sign, each within the accuracy. Ways are added up with their sense, so that what goes to and fro counts for
 !> nothing: of the centre of mass of the free grains, of their spread about it, of the boundaries and of the cell that forces move.
 !>
+!> Velocities are those beside what all boundaries have in common. Where the bodies move as a whole, and by more than the errors of
+!> solves, that is motion and no error. What moves then against the bodies may be error as before: velocities are those beside
+!> their mean velocity.
+!>
 !> The spread is that of a uniform velocity gradient, A = sum m (v - v_c) (x - x_c)^T/(M R), with the centre of mass c, the mass M
 !> and the radius of gyration R of the grains. Its norm is at most the root mean square of v - v_c. Along periodic axes grains have
 !> no place; there the cell may creep, at the velocity gradient times its edges.
@@ -24,7 +28,7 @@ module gravier_drift
   !> Diameters by which a scene may move in such steps before it can be seen. From `free_part` of that on, solves aim at half of the
   !> error for each `halving_part`, down to the least share of the goal.
   real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.4_dp, halving_part = 0.04_dp, least_share = 1.0e-3_dp
-  !> times the errors of solves above which a grain is in the air
+  !> times the errors of solves above which a grain is in the air, and a boundary moves freely
   real(dp), parameter :: in_air = 10.0_dp
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
@@ -56,8 +60,8 @@ contains
     drift_words = 1 + 9*(of_cell + n_boundaries)
   end function drift_words
 
-  !> Add the ways of a step that has ended, if its solve has converged and its motion is not told from the error of the solve. All
-  !> velocities are relative to what all boundaries have in common. Collective.
+  !> Add the ways of a step that has ended, if its solve has converged and the motion of its bodies against each other is not told
+  !> from the error of the solve. Collective.
   subroutine drift_note(self, decomposition, physics, impulses, mass, scale, solve)
     class(drift_t), intent(inout) :: self
     !> with the velocities of the end of the step
@@ -70,15 +74,17 @@ contains
     !> of the step
     type(velocity_scale_t), intent(in) :: scale
     type(solve_report_t), intent(in) :: solve
-    real(dp) :: velocity(9), gradient(9), most
+    real(dp) :: velocity(9), gradient(9), frame(3), most
     integer :: b
 
     most = unresolved_times*solve%velocity_error
-    if (.not. (scale%own < most .and. solve%status == solve_converged)) return
+    if (.not. (scale%apart < most .and. solve%status == solve_converged)) return
     self%steps = self%steps + 1
+    frame(:) = scale%frame
+    if (.not. norm2(scale%mean) < most) frame(:) = scale%frame + scale%mean
     if (.not. allocated(self%way)) allocate (self%way(9, of_cell + size(decomposition%boundaries)), source=0.0_dp)
     if (mass > 0.0_dp) then
-      call find_motion(decomposition, mass, scale%frame, most, velocity, gradient)
+      call find_motion(decomposition, mass, frame, most, velocity, gradient)
       call add_way(velocity, physics%h, most, self%way(:, of_centre))
       call add_way(gradient, physics%h, most, self%way(:, of_spread))
     end if
@@ -91,8 +97,9 @@ contains
       ! one that bears nothing moves freely
       if (.not. any(abs(impulses(:, b)) > 0.0_dp)) cycle
       associate (boundary => decomposition%boundaries(b))
-        velocity(1:3) = merge(boundary%velocity - scale%frame, 0.0_dp, boundary%free)
+        velocity(1:3) = merge(boundary%velocity - frame, 0.0_dp, boundary%free)
       end associate
+      if (norm2(velocity) > in_air*most) cycle
       call add_way(velocity, physics%h, most, self%way(:, of_cell + b))
     end do
   end subroutine drift_note
@@ -221,7 +228,7 @@ contains
     if (self%steps == 0 .or. .not. (scale%diameter > 0.0_dp .and. scale%value > 0.0_dp)) return
     halvings = (self%length()/(most_drift*scale%diameter) - free_part)/halving_part
     if (.not. halvings > 0.0_dp) return
-    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), scale%share*scale%own/scale%value))
+    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), scale%share*scale%apart/scale%value))
   end function drift_goal_share
 
   pure subroutine drift_get_state(self, words)

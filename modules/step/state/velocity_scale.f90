@@ -8,8 +8,11 @@
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; now, ten steps
 !>            before or ten steps later, which counts where a drive starts or turns round
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
-!>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
-!>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
+!>     apart  root mean square velocity of the bodies in contact at the start of the step, beside their mean velocity and that of a
+!>            cell that deforms. Spins of bodies that are no disks or spheres count with their energy, because they bring surfaces
+!>            towards each other
+!>     own    the same beside what all boundaries have in common. Where it is more than five times apart, bodies move as a whole
+!>            and not against each other: it is apart then, unless there is nothing else to compare with
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
 !>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
@@ -54,6 +57,8 @@ module gravier_velocity_scale
   !> The part of the velocity that bonds could give to the mean grain in a step which U may have at most: the motion as a whole says
   !> nothing of the forces that bonds have to bear.
   real(dp), parameter :: share_of_bonds = 0.2_dp
+  !> Bodies move as a whole if they move against each other by less than this part of what they move by.
+  real(dp), parameter :: as_a_whole = 0.2_dp
   !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> s from which on the kind of a load names springs
@@ -64,7 +69,7 @@ module gravier_velocity_scale
 
   type :: velocity_scale_t
     !> what can be meant by the velocity of a scene, and which velocity counts [m/s]
-    real(dp) :: load = 0.0_dp, drive = 0.0_dp, creep = 0.0_dp, own = 0.0_dp, stress = 0.0_dp, value = 0.0_dp
+    real(dp) :: load = 0.0_dp, drive = 0.0_dp, creep = 0.0_dp, apart = 0.0_dp, own = 0.0_dp, stress = 0.0_dp, value = 0.0_dp
     !> the one that counts
     character(len=20) :: kind = "none"
     !> diameter [m] and mass [kg] of the mean grain; 0 without grains
@@ -83,6 +88,8 @@ module gravier_velocity_scale
     real(dp) :: given = 0.0_dp
     !> velocity of the observer: that which all boundaries have in common, or of the whole scene where there are none [m/s]
     real(dp) :: frame(3) = 0.0_dp
+    !> mean velocity beside that of the bodies in contact at the start of the step, by mass [m/s]
+    real(dp) :: mean(3) = 0.0_dp
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
     real(dp), allocatable :: lever(:)
   contains
@@ -144,9 +151,9 @@ contains
     real(dp), intent(in) :: area(:)
     type(imposed_motion_t) :: motion
     !> squares and number of attractions, of impulses where nothing loads or drives; number, masses and their squares of grains;
-    !> sum of h^2 k/m over compliant contacts, number of contacts that bear something; mass, twice the energy and momentum of all
-    !> bodies
-    real(dp) :: parts(11 + decomposition%nd, size(problem%sub)), sums(11 + decomposition%nd)
+    !> sum of h^2 k/m over compliant contacts, number of contacts that bear something; mass and twice the energy of all bodies, and
+    !> along each axis the mass of those that move freely and their momentum
+    real(dp) :: parts(11 + 2*decomposition%nd, size(problem%sub)), sums(11 + 2*decomposition%nd)
     real(dp) :: attraction
     logical :: idle
     integer :: s
@@ -180,18 +187,18 @@ contains
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%stiffness = 0.0_dp
     if (sums(9) > 0.0_dp) self%stiffness = sums(8)/sums(9)
-    self%own = 0.0_dp
-    if (sums(10) > 0.0_dp) then
-      ! nothing holds a scene without boundaries: its mean motion is none
-      if (.not. motion%bounded) sums(11) = max(sums(11) - sum(sums(12:)**2)/sums(10), 0.0_dp)
-      self%own = sqrt(sums(11)/sums(10))
-    end if
     self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
-    call self%choose()
-    if (.not. motion%bounded .and. sums(10) > 0.0_dp) motion%common(1:decomposition%nd) = sums(12:)/sums(10)
+    call find_motion(decomposition%nd, sums(10:), self%own, self%mean(1:decomposition%nd), self%apart)
     self%frame(:) = motion%common
-    call set_concerns(self, physics, motion%common, sums(5:7), problem)
+    ! nothing holds a scene without boundaries: its mean motion is none
+    if (.not. motion%bounded) then
+      self%frame(:) = self%mean
+      self%mean(:) = 0.0_dp
+      self%own = self%apart
+    end if
+    call self%choose()
+    call set_concerns(self, physics, self%frame, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
     ! what a drive that starts carries is not at rest: here the present velocities count
@@ -252,9 +259,33 @@ contains
     end do
   end subroutine add_masses
 
-  !> Mass, twice the energy and momentum of the grains at the start of the step. Loads of the step are taken out of the
-  !> velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains share counts
-  !> in equal parts.
+  !> The motion of the bodies from its sums.
+  pure subroutine find_motion(nd, sums, own, mean, apart)
+    integer, intent(in) :: nd
+    !> mass, twice the energy beside the velocity of the observer, mass and momentum along each axis (2 + 2 nd)
+    real(dp), intent(in) :: sums(:)
+    !> root mean square velocity beside that of the observer, mean velocity (nd), root mean square beside that [m/s]
+    real(dp), intent(out) :: own, mean(:), apart
+    real(dp) :: square
+    integer :: d
+
+    own = 0.0_dp
+    mean(:) = 0.0_dp
+    apart = 0.0_dp
+    if (.not. sums(1) > 0.0_dp) return
+    square = sums(2)
+    do d = 1, nd
+      if (.not. sums(2 + d) > 0.0_dp) cycle
+      mean(d) = sums(2 + nd + d)/sums(2 + d)
+      square = square - mean(d)*sums(2 + nd + d)
+    end do
+    own = sqrt(sums(2)/sums(1))
+    apart = sqrt(max(square, 0.0_dp)/sums(1))
+  end subroutine find_motion
+
+  !> Mass, twice the energy, and mass and momentum along each axis of the grains at the start of the step. Loads of the step are
+  !> taken out of the velocities again: at rest under gravity these are h g, which is no motion. A grain that several subdomains
+  !> share counts in equal parts.
   pure subroutine add_grains(sub, physics, frame, shaped, sums)
     type(subproblem_t), intent(in) :: sub
     type(physics_t), intent(in) :: physics
@@ -262,12 +293,12 @@ contains
     real(dp), intent(in) :: frame(3)
     !> there are bodies that are no disks or spheres
     logical, intent(in) :: shaped
-    !> (2 + nd)
+    !> (2 + 2 nd)
     real(dp), intent(inout) :: sums(:)
     real(dp) :: v(3), m
     integer :: b, nd
 
-    nd = size(sums) - 2
+    nd = (size(sums) - 2)/2
     do b = 1, sub%n_grains
       call find_own_velocity(sub, physics, b, v(1:nd))
       v(1:nd) = v(1:nd) - frame(1:nd)
@@ -275,7 +306,8 @@ contains
       sums(1) = sums(1) + m
       sums(2) = sums(2) + m*sum(v(1:nd)**2)
       if (shaped) sums(2) = sums(2) + m*square_of_spin(sub, b, nd)
-      sums(3:) = sums(3:) + m*v(1:nd)
+      sums(3:2 + nd) = sums(3:2 + nd) + m
+      sums(3 + nd:) = sums(3 + nd:) + m*v(1:nd)
     end do
   end subroutine add_grains
 
@@ -382,9 +414,9 @@ contains
     type(subproblem_t), intent(in) :: sub
     type(boundary_t), intent(in) :: boundaries(:)
     real(dp), intent(in) :: frame(3)
-    !> (2 + nd)
+    !> (2 + 2 nd)
     real(dp), intent(inout) :: sums(:)
-    real(dp) :: v(size(sums) - 2), m
+    real(dp) :: v((size(sums) - 2)/2), m
     integer :: b, nd
 
     nd = size(v)
@@ -394,7 +426,8 @@ contains
         v(:) = merge(boundary%last_velocity(1:nd) - frame(1:nd), 0.0_dp, boundary%free(1:nd))
         sums(1) = sums(1) + m
         sums(2) = sums(2) + m*sum(v**2)
-        sums(3:) = sums(3:) + m*v
+        sums(3:2 + nd) = sums(3:2 + nd) + merge(m, 0.0_dp, boundary%free(1:nd))
+        sums(3 + nd:) = sums(3 + nd:) + m*v
       end associate
     end do
   end subroutine add_driven
@@ -464,6 +497,7 @@ contains
     self%quiet = self%value
     if (self%kind == of_springs) self%quiet = self%load
     if (self%internal .and. .not. self%drive > 0.0_dp) self%quiet = 0.0_dp
+    if (self%quiet > 0.0_dp .and. self%apart < as_a_whole*self%own) self%own = self%apart
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
       self%value = self%share*self%own

@@ -56,15 +56,17 @@ contains
     end do
   end subroutine set_velocities
 
-  !> Note a step with the velocity `own` before it, whose boundaries bear something but for the first one.
-  subroutine note(drift, sim, own, frame, status)
+  !> Note a step with the velocity `apart` before it, whose boundaries bear something but for the first one.
+  subroutine note(drift, sim, apart, frame, status, mean)
     type(drift_t), intent(inout) :: drift
     type(simulation_t), intent(in) :: sim
-    real(dp), intent(in) :: own
+    real(dp), intent(in) :: apart
     !> along x [m/s]
     real(dp), intent(in), optional :: frame
     !> of the solve; converged unless told
     integer, intent(in), optional :: status
+    !> velocity of the bodies beside the frame (3) [m/s]
+    real(dp), intent(in), optional :: mean(:)
     real(dp) :: impulses(2, size(sim%decomposition%boundaries))
     type(velocity_scale_t) :: scale
     type(solve_report_t) :: solve
@@ -74,8 +76,9 @@ contains
     solve%velocity_error = error
     impulses(:, :) = 1.0_dp
     if (size(impulses, 2) > 0) impulses(:, 1) = 0.0_dp
-    scale%own = own
+    scale%apart = apart
     if (present(frame)) scale%frame(1) = frame
+    if (present(mean)) scale%mean(:) = mean
     call drift%note(sim%decomposition, sim%physics, impulses, sim%mass, scale, solve)
   end subroutine note
 
@@ -106,6 +109,11 @@ contains
     call set_velocities(sim, [5.1_dp, 0.0_dp], 0.0_dp)
     call note(drift, sim, 1.9_dp, frame=5.0_dp)
     call check_close(drift%length(), 0.1_dp*h, rounding, "beside what all boundaries have in common")
+    drift = drift_t()
+    call note(drift, sim, 1.9_dp, frame=2.0_dp, mean=[3.0_dp, 0.0_dp, 0.0_dp])
+    call check_close(drift%length(), 0.1_dp*h, rounding, "beside the mean velocity, if that is told from errors")
+    call note(drift, sim, 1.9_dp, frame=5.0_dp, mean=[1.9_dp, 0.0_dp, 0.0_dp])
+    call check_close(drift%length(), 0.2_dp*h, rounding, "and beside the boundaries, if it is not")
     call sim%free()
   end subroutine test_centre
 
@@ -147,6 +155,9 @@ contains
     sim%decomposition%boundaries(1)%velocity(2) = 0.7_dp
     call note(drift, sim, 0.0_dp)
     call check_close(drift%length(), 0.1_dp*h, rounding, "one that bears nothing moves freely")
+    sim%decomposition%boundaries(lid)%velocity(2) = 21.0_dp
+    call note(drift, sim, 0.0_dp)
+    call check_close(drift%length(), 0.1_dp*h, rounding, "and so does one that is fast")
     call sim%free()
   end subroutine test_boundaries
 
@@ -177,7 +188,7 @@ contains
     type(velocity_scale_t) :: at_rest, moving
 
     at_rest = velocity_scale_t(diameter=0.2_dp, value=1.0_dp)
-    moving = velocity_scale_t(diameter=0.2_dp, value=8.0_dp, share=0.3_dp, own=10.0_dp)
+    moving = velocity_scale_t(diameter=0.2_dp, value=8.0_dp, share=0.3_dp, apart=10.0_dp)
     call make_scene(comm, row//rest, sim)
     call check_close(drift%goal_share(at_rest), 1.0_dp, 0.0_dp, "before the first step")
     call set_velocities(sim, [0.0_dp, 9.9_dp*part/h], 0.0_dp)
