@@ -109,7 +109,7 @@ contains
     if (.not. is_finite(self%solve%residual)) call refuse("residual")
     if (.not. is_finite(self%solve%jump)) call refuse("jump")
     do k = 1, diagnostics%n_columns
-      if (.not. is_finite(diagnostics%value(k))) call refuse(trim(diagnostics%name(k)))
+      if (.not. (is_finite(diagnostics%value(k)) .or. diagnostics%is_absent(k))) call refuse(trim(diagnostics%name(k)))
     end do
 
   contains

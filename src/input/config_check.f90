@@ -380,6 +380,7 @@ contains
     type(report_t), intent(in) :: report
     type(config_t), intent(in) :: config
     type(error_t), allocatable, intent(inout) :: error
+    integer :: i
 
     call expect(report, config%output%directory /= "", "output", "directory", error)
     call expect(report, config%output%directory(1:1) /= "~", "output", "directory", error, &
@@ -393,6 +394,13 @@ contains
                 ".false. without final_bodies = .true., whose file holds them")
     call expect(report, config%output%checkpoint_seconds >= 0.0_dp, "output", "checkpoint_seconds", error)
     call expect(report, config%output%walltime >= 0.0_dp, "output", "walltime", error)
+    associate (tracked => config%output%tracked_bodies)
+      call expect(report, all(tracked >= 0), "output", "tracked_bodies", error)
+      do i = 1, size(tracked)
+        call expect(report, tracked(i) == 0 .or. count(tracked == tracked(i)) == 1, "output", "tracked_bodies", error, &
+                    "each identifier once")
+      end do
+    end associate
   end subroutine check_output
 
   !> Are the counts along each axis positive, the third one 1 in 2D?

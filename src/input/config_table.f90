@@ -337,7 +337,9 @@ module gravier_config_table
            "step whose contact problem is written to `step_N.hdf5` in the format of FCLIB; 0: none"), &
      key_t("output", "checkpoint_seconds", kind_real, "0.0", ">= 0", "wall time between two checkpoints; 0: never", unit="s"), &
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
-           "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s")]
+           "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &
+     key_t("output", "tracked_bodies", kind_integer, "8*0", ">= 1", &
+           "identifiers of bodies whose places and velocities `history.csv` has in each step", count=8, note="none")]
 
   type(key_t), parameter :: region_keys(*) = &
     [key_t("region", "name", kind_text, "''", "letters, digits and underscores after a letter", &

@@ -192,6 +192,8 @@ module gravier_config_types
     !> s: the run writes a checkpoint and stops before it has run so long; 0: no limit
     real(dp) :: walltime
     logical :: vtk
+    !> identifiers of the bodies that history.csv follows; 0: none
+    integer :: tracked_bodies(8)
     !> which diagnostics are asked for, in the order of the registry
     logical, allocatable :: diagnostics(:)
   contains

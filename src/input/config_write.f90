@@ -104,10 +104,11 @@ contains
     if (key%group == "scene" .and. key%name == "gravity") in_force = config%scene%gravity_table == ""
     if (key%group == "sample" .and. key%name == "solid_fraction") &
       in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
-    if (key%name /= "grain_shapes" .and. key%name /= "grain_shares") return
+    if (all([character(len=14) :: "grain_shapes", "grain_shares", "tracked_bodies"] /= key%name)) return
     slot = slot_of(config, key, instance)
     if (associated(slot%text)) in_force = slot%text /= ""
     if (associated(slot%reals)) in_force = any(slot%reals > 0.0_dp)
+    if (associated(slot%integers)) in_force = any(slot%integers > 0)
   end function in_force
 
   !> The value of a key as it would be typed after the equal sign; reading it back gives the same value.

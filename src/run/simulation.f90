@@ -23,6 +23,7 @@ module gravier_simulation
   use gravier_scene_period, only: check_in_period
   use gravier_diagnostic_registry, only: diagnostic_holder_t
   use gravier_scene_regions, only: make_region_means
+  use gravier_scene_tracks, only: make_tracked_bodies
   use gravier_method_choice, only: choose_scheme, choose_fallback
   use gravier_column_solution, only: column_solution_t
   implicit none
@@ -222,14 +223,15 @@ contains
     end associate
   end subroutine prepare_inflow
 
-  !> Prepare the balance of every run, the diagnostics that &output asks for and the means over regions, of the scene as it is.
+  !> Prepare the balance of every run and the diagnostics that &output and the groups &region ask for, of the scene as it is.
   !> Collective.
   subroutine simulation_start_diagnostics(self)
     class(simulation_t), intent(inout) :: self
-    type(diagnostic_holder_t), allocatable :: more(:)
+    type(diagnostic_holder_t) :: more(2)
 
     call self%balance%begin(self%decomposition, self%physics)
-    call make_region_means(self%config, more)
+    call make_tracked_bodies(self%config, more(1))
+    call make_region_means(self%config, more(2))
     call self%diagnostics%init(self%decomposition, self%physics, self%config%output%diagnostics, more)
   end subroutine simulation_start_diagnostics
 

@@ -31,6 +31,7 @@ module gravier_scene
   use gravier_scene_boundaries, only: make_boundaries, check_pressures
   use gravier_scene_insertions, only: make_insertions, check_regions
   use gravier_scene_regions, only: check_mean_regions
+  use gravier_scene_tracks, only: check_tracked_bodies
   implicit none
   private
   public :: scene_t, make_scene
@@ -113,6 +114,7 @@ contains
     if (.not. allocated(error)) call check_cell(config, scene%cell_drive, scene%period, size(scene%boundaries), error)
     call check_regions(config, scene%insertions, scene%period, scene%boundaries, error)
     call check_mean_regions(config, scene%period, error)
+    call check_tracked_bodies(comm, config, data%id, error)
     call comm%agree(error)
     if (allocated(error)) return
     call collect_laws(config, scene%laws)

@@ -16,15 +16,14 @@ module gravier_scene_regions
 
 contains
 
-  !> The diagnostic of the regions; of no size where there are none.
-  subroutine make_region_means(config, more)
+  !> The diagnostic of the regions, not allocated where there are none.
+  subroutine make_region_means(config, holder)
     type(config_t), intent(in) :: config
-    type(diagnostic_holder_t), allocatable, intent(out) :: more(:)
+    type(diagnostic_holder_t), intent(out) :: holder
     type(region_means_t), allocatable :: means
     integer :: r
 
-    allocate (more(merge(1, 0, size(config%regions) > 0)))
-    if (size(more) == 0) return
+    if (size(config%regions) == 0) return
     allocate (means)
     allocate (means%region(size(config%regions)))
     do r = 1, size(means%region)
@@ -37,7 +36,7 @@ contains
         region%sample_every = merge(given%sample_every, 0, given%sample_every_given)
       end associate
     end do
-    call move_alloc(means, more(1)%diagnostic)
+    call move_alloc(means, holder%diagnostic)
   end subroutine make_region_means
 
   !> Refuse regions that are longer than a period of the scene, in which a grain would be twice, and those that are farther than

@@ -77,6 +77,9 @@ FILES = [
     ("no equal sign", GOOD + "&solver sweeps 2 /\n", ("&solver", "expected key = value", "sweeps 2")),
     ("word without quotes", GOOD + "&solver method = nscdd /\n", ("&solver method = nscdd", "'nscdd_ep'")),
     key("output", "fclib_step", "3", "at most steps = 2"),
+    key("output", "tracked_bodies", "77", "expected the identifiers of bodies of the scene"),
+    key("output", "tracked_bodies", "1, 2, 1", "expected each identifier once"),
+    key("output", "tracked_bodies", "1, -2", "expected at most 8 integers >= 1"),
     key("output", "final_forces", ".true.", "without final_bodies = .true."),
     # the type
     key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),

@@ -313,6 +313,16 @@ class Scales(RunTestCase):
                 else:
                     self.assertEqual(found[0], 0)
 
+    def test_held_by_grains(self):
+        """A light lid that a large force presses on disks at rest does not move, though it would go far without them."""
+        write(self.here("held.csv"), "id,x,y,radius,mass\n1,0,0.005,0.005,0.1\n2,0.02,0.005,0.005,0.1\n")
+        lid = {"name": "lid", "shape": "plane", "point": [0.0, 0.01], "normal": [0.0, -1.0], "free": [False, True], "force": [0.0, -100.0], "mass": 0.1}
+        run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../held.csv"}, "time": {"step": 3e-3, "steps": 20},
+                        "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}, lid], "output": {"directory": "results"}}, 1, self.here("held"))
+        self.assert_status(run, 0)
+        self.assertEqual(run.history()["fast"].sum(), 0)
+        self.assertNotIn("too far", run.stdout)
+
     def test_pressure(self):
         line = self.assert_heeded(SHEAR, "under the pressure on", {"boundary": [{**SHEAR["boundary"][0], "velocity": [0.0, 0.0], "pressure": 1e5}]})
         self.figures(line, rf"h sqrt\(P/rho\)/d = {NUMBER} under the pressure on 'lid'", 1e-3 * math.sqrt(1e5 / DENSITY) / (2 * RADIUS))

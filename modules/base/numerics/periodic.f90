@@ -30,7 +30,7 @@ module gravier_periodic
     procedure :: find_images => period_find_images
     procedure :: gradient => period_gradient
     procedure :: set_gradient => period_set_gradient
-    procedure :: tilt_along => period_tilt_along
+    procedure :: unwrap => period_unwrap
     procedure :: centre => period_centre
     procedure :: move => period_move
     procedure :: straighten => period_straighten
@@ -116,19 +116,19 @@ contains
     end do
   end subroutine add_edges
 
-  !> What the tilts of the edges add along axis `d` to a shift by whole periods [m].
-  pure real(dp) function period_tilt_along(self, shift, d) result(way)
+  !> Move a place out of the cell by the periods that `wrap` has taken away.
+  pure subroutine period_unwrap(self, turns, x)
     class(period_t), intent(in) :: self
-    !> (nd) periods along each axis
-    integer, intent(in) :: shift(:)
-    integer, intent(in) :: d
+    !> (nd): periods along each axis
+    integer, intent(in) :: turns(:)
+    !> (nd) [m]
+    real(dp), intent(inout) :: x(:)
+    integer :: shift(3)
 
-    way = 0.0_dp
-    if (d == 1) way = shift(2)*self%tilt(1)
-    if (size(shift) < 3) return
-    if (d == 1) way = way + shift(3)*self%tilt(2)
-    if (d == 2) way = shift(3)*self%tilt(3)
-  end function period_tilt_along
+    shift(:) = 0
+    shift(1:size(turns)) = turns
+    call add_edges(shift, self%length, self%tilt, x)
+  end subroutine period_unwrap
 
   !> Shifts that bring a place of the cell to the cell or within `margin` of it, in ascending order; `margin` is less than half of
   !> each length.

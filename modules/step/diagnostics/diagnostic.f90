@@ -29,6 +29,8 @@ module gravier_diagnostic
     integer :: measures = in_each_step
     !> its columns hold for the scene as a whole, and are written to results.h5; others are in history.csv alone
     logical :: of_scene = .true.
+    !> what its columns describe may be absent; they are NaN then
+    logical :: may_be_absent = .false.
     !> words of 64 bits that a checkpoint keeps, 0: it has no past; the name of their array in the file, and what they are, one by
     !> one: with the text a checkpoint changes its version
     integer :: n_words = 0

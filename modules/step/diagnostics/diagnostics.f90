@@ -1,6 +1,7 @@
 !> The diagnostics that a user asks for, and their figures as columns of a table. What is not asked for is neither computed nor
 !> kept.
 module gravier_diagnostics
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use gravier_kinds, only: dp, i8
   use gravier_timers, only: start_timer, stop_timer, phase_diagnostics
   use gravier_decomposition, only: decomposition_t
@@ -37,6 +38,7 @@ module gravier_diagnostics
     procedure :: place => diagnostics_place
     procedure :: in_history => diagnostics_in_history
     procedure :: in_results => diagnostics_in_results
+    procedure :: is_absent => diagnostics_is_absent
     procedure :: get_histograms => diagnostics_get_histograms
     procedure :: free => diagnostics_free
     procedure, private :: fill => diagnostics_fill
@@ -51,7 +53,7 @@ contains
     type(physics_t), intent(in) :: physics
     !> (registered diagnostics)
     logical, intent(in) :: asked(:)
-    !> is emptied
+    !> not allocated where there is none; is emptied
     type(diagnostic_holder_t), intent(inout) :: more(:)
     type(diagnostic_holder_t), allocatable :: all_kinds(:), list(:)
     logical, allocatable :: taken(:)
@@ -59,12 +61,13 @@ contains
 
     call registered_diagnostics(all_kinds)
     allocate (list(size(all_kinds) + size(more)))
-    allocate (taken(size(list)), source=.true.)
+    allocate (taken(size(list)))
     taken(1:size(asked)) = asked
     do k = 1, size(all_kinds)
       call move_alloc(all_kinds(k)%diagnostic, list(k)%diagnostic)
     end do
     do k = 1, size(more)
+      taken(size(all_kinds) + k) = allocated(more(k)%diagnostic)
       call move_alloc(more(k)%diagnostic, list(size(all_kinds) + k)%diagnostic)
     end do
     call self%take(decomposition, physics, list, taken)
@@ -184,6 +187,13 @@ contains
       is_in = owner%features%of_scene .and. owner%measured
     end associate
   end function diagnostics_in_results
+
+  !> Whether column `k` describes what the scene does not have in the present step.
+  pure logical function diagnostics_is_absent(self, k) result(is_absent)
+    class(diagnostics_t), intent(in) :: self
+    integer, intent(in) :: k
+    is_absent = self%asked(owner_of(self, k))%features%may_be_absent .and. ieee_is_nan(self%value(k))
+  end function diagnostics_is_absent
 
   !> Place among `asked` of the diagnostic that column `k` belongs to.
   pure integer function owner_of(self, k) result(owner)

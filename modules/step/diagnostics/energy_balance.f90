@@ -410,7 +410,7 @@ contains
     type(energy_balance_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
-    real(dp) :: part(size(decomposition%owned)), x
+    real(dp) :: part(size(decomposition%owned)), x(decomposition%nd)
     integer :: s, k, d
 
     part(:) = 0.0_dp
@@ -418,12 +418,11 @@ contains
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
           if (owned%glued(k) > 0) cycle
+          x(:) = owned%position(:, k)
+          if (owned%ni > 0) call decomposition%period%unwrap(owned%image(:, k), x)
           do d = 1, owned%nd
-            x = owned%position(d, k)
-            if (owned%ni > 0) x = x + owned%image(d, k)*decomposition%period%length(d)
-            if (decomposition%period%moves) x = x + decomposition%period%tilt_along(owned%image(:, k), d)
             part(s) = part(s) - (owned%mass(k)*physics%gravity(d) &
-              & + decomposition%figures%volume_of(owned, k)*physics%body_force(d))*x
+              & + decomposition%figures%volume_of(owned, k)*physics%body_force(d))*x(d)
           end do
         end do
       end associate

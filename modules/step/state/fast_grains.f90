@@ -19,7 +19,8 @@ contains
 
   !> Count the grains that move by more than half of their thickness in a step, a ball by more than its radius, beside a cell that
   !> moves, and bodies whose ends go so far beyond their middle by turning: they may pass through others unseen. Grains that come so
-  !> much nearer to a boundary which itself goes half as far are among them: it may pass through them. Collective.
+  !> much nearer to a boundary which itself goes half as far are among them: it may pass through them. Loads count from the next
+  !> step on, of grains and of boundaries: contacts may hold them. Collective.
   integer(i8) function count_fast(decomposition, physics) result(fast)
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
@@ -81,7 +82,7 @@ contains
       if (.not. least > 0.0_dp) call find_extent(decomposition, least, low, high)
       if (.not. least < huge(1.0_dp)) exit
       associate (boundary => decomposition%boundaries(b))
-        speed = max(norm2(boundary%velocity), norm2(boundary%last_velocity)) + &
+        speed = max(norm2(merge(0.0_dp, boundary%velocity, boundary%free)), norm2(boundary%last_velocity)) + &
           & max(norm2(boundary%spin), norm2(boundary%last_spin))*norm2(max(abs(low - boundary%pivot), abs(high - boundary%pivot)))
         if (h*speed <= least_way*least .and. .not. any(boundary%period > 0.0_dp .and. boundary%drive%turns())) cycle
       end associate
@@ -139,6 +140,7 @@ contains
     passed = .false.
     call boundary%last_velocity_at(bodies%position(:, k), velocity(:, 1))
     call boundary%velocity_at(bodies%position(:, k), velocity(:, 2))
+    velocity(:, 2) = merge(velocity(:, 1), velocity(:, 2), boundary%free(1:bodies%nd))
     way = h*max(norm2(velocity(:, 1)), norm2(velocity(:, 2)))
     if (.not. way > least_way*half) return
     way = way + h*norm2(bodies%velocity(1:bodies%nd, k))

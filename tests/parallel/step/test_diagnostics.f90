@@ -104,14 +104,16 @@ end module own_diagnostics
 
 !> Diagnostics as a whole: the registry, what is asked for and what is not, when each is called, columns, histograms and states.
 program test_diagnostics
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_diagnostic, only: diagnostic_features_t, column_list_t, histogram_t, in_each_step, in_written_steps
+  use gravier_diagnostic, only: diagnostic_features_t, column_list_t, histogram_t, solved_step_t, in_each_step, in_written_steps
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics, diagnostic_place
   use gravier_diagnostics, only: diagnostics_t
   use gravier_boundary_forces, only: boundary_forces_t
   use gravier_boundary_moments, only: boundary_moments_t
+  use gravier_tracked_bodies, only: tracked_bodies_t
   use gravier_contact_structure, only: contact_structure_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use own_diagnostics, only: counter_t, least_t
@@ -132,6 +134,7 @@ program test_diagnostics
   call test_histograms()
   call test_asked()
   call test_boundary_forces()
+  call test_tracked_bodies()
   call finish_checks()
   call comm%free()
   call stop_parallel()
@@ -345,4 +348,47 @@ contains
     call sim%free()
   end subroutine test_boundary_forces
 
+  !> A body that is found again where it went, and one that the scene does not have.
+  subroutine test_tracked_bodies()
+    type(simulation_t), target :: sim
+    type(tracked_bodies_t) :: tracked
+    type(column_list_t) :: list
+    type(solved_step_t) :: step
+    integer :: s, k
+
+    call make_scene(comm, case_text, sim)
+    step%decomposition => sim%decomposition
+    allocate (tracked%id(2))
+    tracked%id(:) = [4_i8, 99_i8]
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          owned%velocity(:, k) = 0.0_dp
+          owned%velocity(1, k) = real(owned%id(k), dp)
+        end do
+      end associate
+    end do
+    call tracked%begin(sim%decomposition, sim%physics)
+    call tracked%columns(list)
+    call check_equal(list%n, 2*(2 + sim%decomposition%nv), "columns")
+    call check_equal(trim(list%name(1))//" "//trim(list%name(4))//" "//trim(list%name(list%n)), &
+      & "body_x:4 body_vy:4 body_vy:99", "names")
+    call check_close(list%value(3), 4.0_dp, 0.0_dp, "its velocity")
+    call check(ieee_is_nan(list%value(list%n)), "a body that is not there")
+    ! two bodies change their places
+    do s = 1, size(sim%decomposition%owned)
+      associate (owned => sim%decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%id(k) == 4 .or. owned%id(k) == 1) owned%id(k) = 5_i8 - owned%id(k)
+        end do
+      end associate
+    end do
+    call tracked%measure(step)
+    call list%clear()
+    call tracked%columns(list)
+    call check_close(list%value(3), 1.0_dp, 0.0_dp, "it is found in another place")
+    call sim%free()
+  end subroutine test_tracked_bodies
+
 end program test_diagnostics
+

@@ -72,6 +72,9 @@ contains
     w(2) = turns(2)*3.0_dp + turns(3)*later%tilt(3)
     w(3) = turns(3)*4.0_dp
     call check(maxval(abs(x - y - w)) < 1.0e-13_dp, "by whole edges")
+    call later%unwrap(turns, y)
+    call check(maxval(abs(x - y)) < 1.0e-13_dp, "and back")
+    call later%wrap(y, turns)
     ! all images near the box, each once
     call later%find_images(y, 0.9_dp, shifts, n)
     do i = 1, n

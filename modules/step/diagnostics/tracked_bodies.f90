@@ -1,0 +1,153 @@
+!> Where single bodies are in each step, and how they move.
+module gravier_tracked_bodies
+  use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
+  use gravier_kinds, only: dp, i8
+  use gravier_text, only: to_text
+  use gravier_decomposition, only: decomposition_t
+  use gravier_physics, only: physics_t
+  use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t
+  implicit none
+  private
+  public :: tracked_bodies_t
+
+  !> The same on every rank, but for where the bodies are kept.
+  type, extends(diagnostic_t) :: tracked_bodies_t
+    !> identifiers (bodies)
+    integer(i8), allocatable :: id(:)
+    !> subdomain of this rank and place in it where each body was found last, 0 on ranks that do not have it (bodies)
+    integer, private, allocatable :: subdomain(:), place(:)
+    !> whether the scene has each body (bodies)
+    logical, private, allocatable :: exists(:)
+    !> position without periods, velocity and spin at the end of the step; NaN of a body that the scene does not have
+    !> (nd + nv, bodies) [m, m/s, rad/s]
+    real(dp), private, allocatable :: value(:, :)
+    !> dimension
+    integer, private :: nd = 0
+  contains
+    procedure, nopass :: features => tracked_bodies_features
+    procedure :: begin => tracked_bodies_begin
+    procedure :: measure => tracked_bodies_measure
+    procedure :: columns => tracked_bodies_columns
+  end type tracked_bodies_t
+
+contains
+
+  pure function tracked_bodies_features() result(features)
+    type(diagnostic_features_t) :: features
+
+    features%key = "tracked_bodies"
+    features%meaning = "place and motion of single bodies"
+    ! results.h5 has those of all bodies
+    features%of_scene = .false.
+    features%may_be_absent = .true.
+  end function tracked_bodies_features
+
+  !> Find the bodies. Collective.
+  subroutine tracked_bodies_begin(self, decomposition, physics)
+    class(tracked_bodies_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+
+    associate (unused => physics)
+    end associate
+    self%nd = decomposition%nd
+    allocate (self%subdomain(size(self%id)), self%place(size(self%id)), source=0)
+    allocate (self%exists(size(self%id)))
+    allocate (self%value(self%nd + decomposition%nv, size(self%id)))
+    call search(self, decomposition)
+    call gather(self, decomposition)
+  end subroutine tracked_bodies_begin
+
+  !> Measure each body. Bodies are looked for only where one of them is no longer where it was, or may have entered. Collective.
+  subroutine tracked_bodies_measure(self, step)
+    class(tracked_bodies_t), intent(inout) :: self
+    type(solved_step_t), intent(in) :: step
+    logical :: existed(size(self%id))
+
+    existed(:) = self%exists
+    call gather(self, step%decomposition)
+    if (.not. (any(existed .and. .not. self%exists) .or. step%others .and. .not. all(self%exists))) return
+    call search(self, step%decomposition)
+    call gather(self, step%decomposition)
+  end subroutine tracked_bodies_measure
+
+  !> Find where this rank has the bodies.
+  subroutine search(self, decomposition)
+    type(tracked_bodies_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    integer :: s, k, b
+
+    self%place(:) = 0
+    do s = 1, size(decomposition%owned)
+      do k = 1, decomposition%owned(s)%n
+        do b = 1, size(self%id)
+          if (decomposition%owned(s)%id(k) /= self%id(b)) cycle
+          self%subdomain(b) = s
+          self%place(b) = k
+        end do
+      end do
+    end do
+  end subroutine search
+
+  !> Collect the values of the bodies that are where they were found last. Collective.
+  subroutine gather(self, decomposition)
+    type(tracked_bodies_t), intent(inout) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    !> the values of each body, and 1 where there are some
+    real(dp) :: parts((size(self%value, 1) + 1)*size(self%id), size(decomposition%owned))
+    real(dp) :: sums((size(self%value, 1) + 1)*size(self%id))
+    integer :: b, n, first
+
+    n = size(self%value, 1)
+    parts(:, :) = 0.0_dp
+    do b = 1, size(self%id)
+      if (.not. is_kept(self, decomposition, b)) cycle
+      associate (bodies => decomposition%owned(self%subdomain(b)), k => self%place(b), part => parts(:, self%subdomain(b)))
+        first = (b - 1)*(n + 1)
+        part(first + 1:first + self%nd) = bodies%position(:, k)
+        if (bodies%ni > 0) call decomposition%period%unwrap(bodies%image(:, k), part(first + 1:first + self%nd))
+        part(first + self%nd + 1:first + n) = bodies%velocity(:, k)
+        part(first + n + 1) = 1.0_dp
+      end associate
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    do b = 1, size(self%id)
+      first = (b - 1)*(n + 1)
+      self%exists(b) = sums(first + n + 1) > 0.0_dp
+      self%value(:, b) = sums(first + 1:first + n)
+      if (.not. self%exists(b)) self%value(:, b) = ieee_value(0.0_dp, ieee_quiet_nan)
+    end do
+  end subroutine gather
+
+  !> Whether this rank has a body where it was found last.
+  pure logical function is_kept(self, decomposition, b)
+    type(tracked_bodies_t), intent(in) :: self
+    type(decomposition_t), intent(in) :: decomposition
+    !> number of the body
+    integer, intent(in) :: b
+
+    is_kept = .false.
+    if (self%place(b) == 0) return
+    associate (bodies => decomposition%owned(self%subdomain(b)))
+      if (self%place(b) > bodies%n) return
+      is_kept = bodies%id(self%place(b)) == self%id(b)
+    end associate
+  end function is_kept
+
+  !> Columns with the names of a bodies file and the identifier.
+  subroutine tracked_bodies_columns(self, list)
+    class(tracked_bodies_t), intent(in) :: self
+    type(column_list_t), intent(inout) :: list
+    character(len=*), parameter :: in_plane(5) = [character(len=5) :: "x", "y", "vx", "vy", "omega"], &
+      & in_space(9) = [character(len=5) :: "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"]
+    integer :: b, i
+
+    do b = 1, size(self%id)
+      do i = 1, size(self%value, 1)
+        if (self%nd == 2) call list%add("body_"//trim(in_plane(i))//":"//to_text(self%id(b)), self%value(i, b))
+        if (self%nd == 3) call list%add("body_"//trim(in_space(i))//":"//to_text(self%id(b)), self%value(i, b))
+      end do
+    end do
+  end subroutine tracked_bodies_columns
+
+end module gravier_tracked_bodies
