@@ -4,13 +4,15 @@ import re
 import matplotlib.pyplot as plt
 import numpy
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.ticker import FuncFormatter
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
+#: the same without a hue, where components have their own
+GREYS = LinearSegmentedColormap.from_list("greys", ["0.8", "0.15"])
 STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
@@ -19,6 +21,12 @@ UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|ener
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s"),
          (r"gravity_[xyz]", "m/s²")]
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
+
+
+def times_of(component):
+    """The shades of a component, by its number from 0: from a light one of its colour to a dark one; those of the first are TIMES."""
+    colour = numpy.array(to_rgb(LINES[component % len(LINES)]))
+    return TIMES if component == 0 else LinearSegmentedColormap.from_list(f"times {component}", [1.0 - 0.5 * (1.0 - colour), colour, 0.65 * colour])
 
 
 def label_of_all(name, dimensions):
@@ -253,14 +261,15 @@ def draw_profile(run, name, steps, columns, mean):
         raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
     name, axis = region_with_bins(run, name, steps[-1])
     tables = [run.region_mean(name, steps)] if mean else [run.region(name, step) for step in steps]
-    bar = ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), TIMES)
+    several = any(len(components(tables[0], column, run.dimension, axis)) > 1 for column in columns)
+    bar = ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), GREYS if several else TIMES)
     upright = axis == run.dimension - 1
     figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
                                   figsize=(0.9 + 2.3 * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
                                   sharex=not upright, sharey=upright)
     places = places.ravel()
     for axes, column in zip(places, columns):
-        draw_column(axes, run, tables, column, axis, None if len(tables) == 1 else bar.to_rgba([run.time(step) for step in steps]))
+        draw_column(axes, run, tables, column, axis, None if len(tables) == 1 else bar.norm([run.time(step) for step in steps]))
         grid(axes)
         legend_above(axes, columns=4)
     (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
@@ -274,14 +283,14 @@ def draw_profile(run, name, steps, columns, mean):
     return figure
 
 
-def draw_column(axes, run, tables, column, axis, shades):
-    """Curves of a column: with `shades` a colour a state and a dash a component, else those of one table with a colour a component."""
+def draw_column(axes, run, tables, column, axis, times):
+    """Curves of a column: a colour and a dash a component, with `times` a shade a state, at that part of the time of all."""
     upright = axis == run.dimension - 1
     rows = [components(table, column, run.dimension, axis) for table in tables]
     centres = [table.centre[:, axis] for table in tables]
     for k, (centre, row) in enumerate(zip(centres, rows)):
         for c, (key, values) in enumerate(row.items()):
-            colour = LINES[c % len(LINES)] if shades is None else shades[k]
+            colour = LINES[c % len(LINES)] if times is None else times_of(c)(times[k])
             x, y = (values, centre) if upright else (centre, values)
             axes.plot(x, y, linestyle=PARTS[c % len(PARTS)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
     shown = numpy.concatenate([values for row in rows for values in row.values()])

@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.ticker import MaxNLocator
 from palette import CHAINS, PLAIN, PULLS
 from picture_regions import draw_regions, region_corners
-from picture_space import View, Walls, box_around, draw_flat_walls, draw_space
+from picture_space import View, Walls, box_around, chosen, draw_flat_walls, draw_space, frame_around
 from picture_style import SPEEDS, TURNS, PictureError, colours_of_kinds, scaled
 
 import gravier
@@ -254,12 +254,16 @@ def draw_packing(run, step, options, frame=None):
     if len(bodies) == 0:
         raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
     view, walls, part = View(run.dimension, *options.view or VIEW), Walls(run, step), asked_box(run, options.box)
-    seen = None if part is None else bodies_in(bodies, part)
+    seen, outside = None if part is None else bodies_in(bodies, part), 0
+    title = title_of(run, step, bodies, contacts, seen)
     if part is not None:
         box = part
         walls.keep(*part)
     else:
-        box = box_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
+        box = frame_around(bodies, walls, points_of(run, step, options)) if frame.low is None else (frame.low, frame.high)
+        seen = bodies_in(bodies, box)
+        outside = len(bodies) - numpy.count_nonzero(seen)
+        part, seen = (None, None) if outside == 0 else (box, seen)
     if seen is not None and not seen.any() and frame.low is None:
         raise PictureError(f"{run.path}: no body in this --box; expected one at least of those from {numpy.array2string(bodies.position.min(axis=0), precision=4)} "
                            f"to {numpy.array2string(bodies.position.max(axis=0), precision=4)}")
@@ -272,7 +276,7 @@ def draw_packing(run, step, options, frame=None):
     outlines = run.outlines(step) if shaped(bodies) else None
     drawn = bodies
     if seen is not None:
-        drawn = gravier.Table({name: rows[seen] for name, rows in bodies.items()})
+        drawn = chosen(bodies, seen)
         outlines = None if outlines is None else [outline for outline, is_seen in zip(outlines, seen) if is_seen]
     chains = options.chains and contacts is not None and len(contacts) > 0
     through = 0.25 if chains and not view.flat else 1.0
@@ -293,7 +297,12 @@ def draw_packing(run, step, options, frame=None):
         axes.set_axis_off()
     if options.regions:
         draw_regions(axes, run, step, view, *box_around(bodies, walls))
-    axes.set_title(title_of(run, step, bodies, contacts, seen), fontsize=9, loc="left", pad=18 if options.chains else 6)
+    axes.set_title(title, fontsize=9, loc="left", pad=18 if options.chains else 6)
+    if outside > 0:
+        # beside the name of the axis, or below it where there is no room
+        down = 4 if not view.flat else 18 if options.size * size[0] >= 2.5 else 30
+        axes.annotate(f"{outside} grain{'s' if outside > 1 else ''} outside", (1.0, 0.0), xycoords="axes fraction", xytext=(0, -down),
+                      textcoords="offset points", ha="right", va="top", fontsize=7, color="0.35", annotation_clip=False)
     if values is not None and len(values) > 0:
         add_legend(figure, axes, values, label, how, kinds(run, step, bodies, options.colour)[1] if options.colour in KINDS else None)
     return figure
@@ -307,7 +316,7 @@ def shared_frame(run, steps, options):
     part = asked_box(run, options.box)
     for step in steps:
         bodies = run.bodies(step)
-        low, high = box_around(bodies, Walls(run, step), points_of(run, step, options))
+        low, high = frame_around(bodies, Walls(run, step), points_of(run, step, options))
         lows.append(low)
         highs.append(high)
         values = None if options.colour in KINDS else quantity(run, step, bodies, options.colour)[0]

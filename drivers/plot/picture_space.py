@@ -13,6 +13,9 @@ ARC = numpy.linspace(0.0, 2.0 * numpy.pi, 97)
 ROUNDED = 1e-6
 #: a normal whose component is above this lies along an axis
 ALONG = 0.999
+#: grains of which one may be left out of a frame, the part of them beyond the percentiles on each side, and how many times as large a frame
+#: has to be with those that are far off
+MANY, OUTERMOST, TOO_LARGE = 100, 0.005, 3.0
 
 
 class View:
@@ -116,6 +119,30 @@ def box_around(bodies, walls, points=()):
         foot = middle - numpy.dot(middle - point, normal) * normal
         low, high = numpy.minimum(low, foot), numpy.maximum(high, foot)
     return low, high
+
+
+def frame_around(bodies, walls, points=()):
+    """Corners of the box that a picture shows: that around the bodies, some points and the walls, but without grains that are far off along an axis
+    where these make it more than three times as large. Far off is what lies farther beyond the percentiles 0.5 and 99.5 of the places than half of
+    the distance between these."""
+    low, high = box_around(bodies, walls, points)
+    shown = numpy.ones(len(bodies), dtype=bool)
+    if len(bodies) < MANY:
+        return low, high
+    count = int(numpy.ceil(OUTERMOST * len(bodies)))
+    places = numpy.sort(bodies.position, axis=0)
+    first, last = places[count], places[-1 - count]
+    for a in range(len(low)):
+        near = numpy.abs(bodies.position[:, a] - 0.5 * (first[a] + last[a])) <= last[a] - first[a] + 2.0 * numpy.median(bodies.radius)
+        inner = box_around(chosen(bodies, near), walls, points)
+        if high[a] - low[a] > TOO_LARGE * (inner[1][a] - inner[0][a]):
+            shown &= near
+    return (low, high) if shown.all() or not shown.any() else box_around(chosen(bodies, shown), walls, points)
+
+
+def chosen(bodies, rows):
+    """Some of the bodies, as a table."""
+    return gravier.Table({name: values[rows] for name, values in bodies.items()})
 
 
 # ---- in the plane

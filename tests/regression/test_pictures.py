@@ -73,7 +73,7 @@ class Colours(unittest.TestCase):
     def test_maps(self):
         """Of quantities the lightness falls all the way, of those with a sign from the middle to both ends, to all eyes."""
         for eye in (None, *EYES):
-            for cmap in (SPEEDS, curve_pictures.TIMES):
+            for cmap in (SPEEDS, curve_pictures.GREYS, *map(curve_pictures.times_of, range(5))):
                 light = lightness_and_hue(cmap(np.linspace(0.0, 1.0, 33)), eye)[:, 0]
                 self.assertTrue(np.all(np.diff(light) < 0.0), f"{cmap.name}: {eye}")
             light = lightness_and_hue(plt.get_cmap(TURNS)(np.linspace(0.0, 1.0, 33)), eye)[:, 0]
@@ -450,12 +450,13 @@ class Pictures(RunTestCase):
                 np.testing.assert_array_equal(values, rows.stress[:, "xyz".index(name[0]), "xyz".index(name[1])])
         np.testing.assert_array_equal(curve_pictures.components(rows, "stress_yx", 3, 2)[None], rows.stress[:, 1, 0])
         np.testing.assert_array_equal(curve_pictures.components(rows, "velocity_z", 3, 2)[None], [1.0, 1.0, np.nan])
-        # of several states, whose colours are those of times, each of the five has a dash of its own
+        # of several states each of the five has a dash and a colour of its own
         figure, axes = plt.subplots()
         states = gravier.Table({**rows, "centre": np.zeros((3, 3))})
         with unittest.mock.patch.object(axes, "plot") as plot:
-            curve_pictures.draw_column(axes, SimpleNamespace(dimension=3), [states, states], "stress", 2, ["k", "r"])
+            curve_pictures.draw_column(axes, SimpleNamespace(dimension=3), [states, states], "stress", 2, [0.0, 1.0])
         self.assertEqual(len({str(call.kwargs["linestyle"]) for call in plot.call_args_list[:5]}), 5)
+        self.assertEqual(len({str(call.kwargs["color"]) for call in plot.call_args_list}), 10)
         plt.close(figure)
         figure = curve_pictures.draw_profile(self.disks, "layers", None, ["stress_xy", "velocity_x"], False)
         self.assertEqual([axes.get_xlabel().split(" [")[0] for axes in figure.axes], ["stress xy", "velocity x"])

@@ -25,7 +25,6 @@ import gravier_plot  # noqa: E402
 import packing_picture  # noqa: E402
 import picture_style  # noqa: E402
 
-TIED = (("time", "step"), ("time", "steps"))
 GROUND = {"name": "it's the ground", "shape": "plane", "normal": [0.0, 1.0]}
 
 
@@ -204,60 +203,6 @@ class Package(RunTestCase):
         self.assertEqual(gravier.parse_namelist(text), {"scene": [{"title": "x", "gravity": [0.0, 0.0, -10.0], "bodies": "file"}],
                                                         "output": [{"vtk": True}]})
 
-    def test_study(self):
-        base = {**self.base, "time": {"step": 1e-3, "steps": 2}, "boundary": [GROUND]}
-        points = list(gravier.study(base, {("scene", "friction"): [0.0, 0.4], ("time", "steps"): [2, 3]}, self.here("study")))
-        self.assertEqual([tuple(point.values()) for point, _, _ in points], [(0.0, 2), (0.0, 3), (0.4, 2), (0.4, 3)])
-        for point, place, status in points:
-            run = gravier.Run(place / "results")
-            self.assertEqual((run.case["scene"][0]["friction"], run.steps[-1], status), (*point.values(), 0))
-        self.assertEqual(base["scene"]["friction"], 0.3)
-        table = pathlib.Path(self.here("study/study.csv"))
-        self.assertEqual(table.read_text(), "run,status,scene.friction,time.steps\nrun_1,0,0.0,2\nrun_2,0,0.0,3\nrun_3,0,0.4,2\nrun_4,0,0.4,3\n")
-        for ranks in (0, 1.5, math.nan, math.inf, "2", None):
-            with self.assertRaisesRegex(gravier.CaseError, f"ranks = {ranks}: expected a whole number above 0"):
-                gravier.run(base, self.here("none"), ranks=ranks)
-        for changes, words in (({("scene",): [0.1]}, r"\('scene',\): expected \(group, key\), or \(group, name, key\)"),
-                               ({"scene": [0.1]}, r"'scene': expected \(group, key\), or"),
-                               ({("scene", "friction"): 0.1}, r"\('scene', 'friction'\): 0.1; expected a list of values$"),
-                               ({("scene", "bodies"): "lattice"}, r"\('scene', 'bodies'\): 'lattice'; expected a list of values$"),
-                               ({TIED: [(1e-3, 2, 3)]}, r": \(0.001, 2, 3\); expected a value for each of these 2 keys$"),
-                               ({TIED: [1e-3]}, ": 0.001; expected a value for each of these 2 keys$"), ({(): [1]}, r"\(\): expected \(group, key\)"),
-                               ({TIED: [(1e-3, 2)], ("time", "step"): [1e-3]}, r"\('time', 'step'\): changed twice; expected each key once$")):
-            with self.assertRaisesRegex(gravier.CaseError, words):
-                list(gravier.study(base, changes, self.here("none")))
-        # keys that change together; a table of another origin is nobody's to replace
-        for point, place, status in gravier.study(base, {TIED: [(1e-3, 2), (5e-4, 4)]}, self.here("tied")):
-            time = gravier.Run(place / "results").case["time"][0]
-            self.assertEqual((time["step"], time["steps"], status), (*point.values(), 0))
-        self.assertEqual(pathlib.Path(self.here("tied/study.csv")).read_text(), "run,status,time.step,time.steps\nrun_1,0,0.001,2\nrun_2,0,0.0005,4\n")
-        table.write_text("mine\n")
-        with self.assertRaisesRegex(gravier.CaseError, "study.csv: "):
-            list(gravier.study(base, {("time", "steps"): [2]}, self.here("study")))
-        self.assertEqual(table.read_text(), "mine\n")
-        table.unlink()
-        # a group that stands once is a list of one in what parse_namelist returns
-        parsed = {group: keys if isinstance(keys, list) else [keys] for group, keys in base.items()}
-        for point, place, status in gravier.study(parsed, {("time", "steps"): [2]}, self.here("parsed")):
-            self.assertEqual((point, status), ({("time", "steps"): 2}, 0), place)
-        with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
-            list(gravier.study(base, {("scene", "friction"): [-1.0], ("output", "directory"): ["results"]}, self.here("refused")))
-        self.assertEqual(pathlib.Path(self.here("refused/study.csv")).read_text(), "run,status,scene.friction,output.directory\n")
-        # one of several groups, by its name or its number
-        several = {**base, "boundary": [{**GROUND, "name": "ground"}, {**GROUND, "name": "lower", "point": [0.0, -1.0]}]}
-        for which in ("lower", 2):
-            with self.assertWarnsRegex(UserWarning, "run_3, run_4 of an older study stay; this one has run_1 to run_2$"):
-                for point, place, status in gravier.study(several, {("boundary", which, "friction"): [0.1, 0.7]}, self.here("study")):
-                    case = gravier.Run(place / "results").case["boundary"]
-                    self.assertEqual((case[1]["friction"], case[0].get("friction"), status), (point["boundary", which, "friction"], None, 0))
-        self.assertNotIn("friction", several["boundary"][1])
-        for what, words in ((("boundary", "name"), r"&boundary name: the group stands several times; expected \('boundary', name, 'name'\)"),
-                            (("boundary", "lid", "friction"), "&boundary 'lid': no group of this name or number; expected one of 'ground', 'lower'"),
-                            (("boundary", 3, "friction"), "&boundary 3: no group of this name or number"),
-                            (("boundary", "lower", "table", "friction"), "expected \\(group, key\\), or \\(group, name, key\\)")):
-            with self.assertRaisesRegex(gravier.CaseError, words):
-                list(gravier.study(several, {what: [0.5]}, self.here("refused")))
-
     def test_a_run_beside_another(self):
         """A directory where a run is under way is refused, and what the first one has written stays."""
         base = {**self.base, "time": {"step": 1e-3, "steps": 2}}
@@ -274,6 +219,17 @@ class Package(RunTestCase):
         self.assertEqual({file.name: file.read_bytes() for file in place.iterdir() if file.is_file()}, before)
         with self.assertRaisesRegex(gravier.CaseError, "case.nml: File exists; expected a place for a directory"):
             gravier.run(base, place / "case.nml")
+
+    def test_another_program(self):
+        """A program of Gravier by its name, from where `gravier` comes, and any program by its path, from where Python is."""
+        grains = {"scene": {"bodies": "sample", "gravity": [0.0, -9.81]}, "sample": {"count": 5, "radius": 0.01, "box": [0.1, 0.1], "file": "grains.h5"},
+                  "time": {"step": 1e-3, "steps": 0}}
+        for k, program in enumerate(("gravier_sample", pathlib.Path(os.path.relpath(gravier.case.find_program("gravier_sample"))))):
+            place = pathlib.Path(self.here(f"sample_{k}"))
+            self.assertEqual(gravier.run(grains, place, program=program), 0)
+            self.assertEqual(len(gravier.BodiesFile(place / "grains.h5").bodies()), 5)
+        with self.assertRaisesRegex(gravier.CaseError, "sample_0: gravier ended with status 2: gravier_sample: error: case.nml: &sample file = '': expected"):
+            gravier.run({**grains, "sample": {**grains["sample"], "file": ""}}, self.here("sample_0"), program="gravier_sample")
 
     def test_logs_of_others(self):
         """A terminal.log of another origin is refused before anything is written; one of gravier.run is replaced, also of an earlier version."""

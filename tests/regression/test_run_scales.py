@@ -218,6 +218,23 @@ class Scales(RunTestCase):
             gate = {"boundary": [{**case["boundary"][0], "remove_at": time}]}
             self.assertEqual(len(self.warnings(self.check_case(case, gate))), number)
 
+    def test_sample_that_is_not_prepared(self):
+        """A run starts from a sample as it is placed, and says so where its input asks for more; not so after a restart."""
+        case = {"scene": {"dimension": 2, "bodies": "sample", "density": DENSITY}, "sample": {"count": 30, "radius": RADIUS, "box": [0.3, 0.3], "file": "s.h5"},
+                "time": {"step": 1e-3, "steps": 2}, "output": {"directory": "results", "checkpoint_every": 2}}
+        self.assertEqual(self.warnings(self.check_case(case)), [])
+        for preparation, keys in (("settled", {}), ("compacted", {"pressure": 10.0})):
+            line = (f"warning     &sample preparation = '{preparation}': gravier_sample prepares grains, and a run of gravier starts from them as they are "
+                    "placed; make their file by gravier_sample, and start from it with &scene bodies = 'file'")
+            prepared = merged(case, {"sample": {"preparation": preparation, **keys}})
+            self.assertEqual(self.warnings(self.check_case(prepared)), [line])
+            run = run_case(prepared, 1, self.here(preparation))
+            self.assert_status(run, 0)
+            self.assertEqual(run.stdout.count(line + "\n"), 1)
+            run = run_case(merged(prepared, {"time": {"steps": 4}}), 1, self.here(preparation), ("--restart",))
+            self.assert_status(run, 0)
+            self.assertNotIn("gravier_sample prepares", run.stdout)
+
     def test_far_from_the_origin(self):
         """Places of maps, of which the last digits are coarser than a step at the speed of the scene: a floor that rises came 7 % too short."""
         bodies = "id,x,y,radius\n1,5e5,5000000.02,0.01\n"

@@ -164,7 +164,8 @@ class Site(unittest.TestCase):
 
     def test_the_search_finds_words(self):
         index = json.loads((self.place / "search/search_index.json").read_text(encoding="utf-8"))
-        for word, page in (("capillarity", "reference/law_capillary.html"), ("Nesterov", "acceleration.html"), ("walltime", "checkpoints.html")):
+        for word, page in (("capillarity", "reference/law_capillary.html"), ("Nesterov", "acceleration.html"), ("walltime", "checkpoints.html"),
+                           *((word, "processes.html") for word in ("Bagnold", "repose", "ntruder", "ibrated", "edometer", "irect shear"))):
             self.assertTrue(any(word in entry["text"] and entry["location"].startswith(page) for entry in index["docs"]), word)
 
 

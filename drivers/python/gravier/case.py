@@ -202,7 +202,8 @@ def made_directory(directory):
 
 def run(groups, directory, ranks=1, program=None):
     """Write `groups` as case.nml into `directory` and run it there, with what it says in terminal.log. Paths in a case are relative to that
-    directory. Returns the exit status: 0, or 3 where a solve missed its tolerance. A directory where another `run` is under way, or where a
+    directory. `program` is another program that reads a case, a name such as 'gravier_sample' or a path. Returns the exit status: 0, or 3 where a
+    solve missed its tolerance. A directory where another `run` is under way, or where a
     case.nml or a terminal.log is of another origin, is refused, and nothing in it changes."""
     if not (isinstance(ranks, (int, float, np.integer, np.floating)) and ranks >= 1 and ranks % 1 == 0):
         raise CaseError(f"ranks = {ranks}: expected a whole number above 0")
@@ -214,6 +215,12 @@ def run(groups, directory, ranks=1, program=None):
         raise CaseError(str(refused)) from None
 
 
+def _command(program):
+    """The path of a program that is given by its name or by a path, or its name alone, for PATH to find it."""
+    name = str(program or "gravier")
+    return str(Path(name).resolve()) if os.sep in name else find_program(name)
+
+
 def run_alone(groups, directory, ranks, program):
     """What `run` does where no other one is under way."""
     claim(directory / "terminal.log", {".log": f"{MADE_LOG}|{EARLIER_LOGS}".encode()})
@@ -221,11 +228,11 @@ def run_alone(groups, directory, ranks, program):
     launcher = os.environ.get("MPIEXEC", "mpiexec")
     with open(directory / "terminal.log", "w", encoding="utf-8") as log:
         print(MADE_LOG, end="", file=log, flush=True)
-        done = subprocess.run([launcher, "-n", str(int(ranks)), str(program or find_program()), "case.nml"], cwd=directory,
+        done = subprocess.run([launcher, "-n", str(int(ranks)), _command(program), "case.nml"], cwd=directory,
                               env={**ENVIRONMENT, **os.environ}, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
                               check=False)
     if done.returncode not in (0, 3):
         said = (directory / "terminal.log").read_text(encoding="utf-8", errors="replace").removeprefix(MADE_LOG)
-        lines = re.findall(r"^gravier: error: .*$", said, re.M) or said.strip().splitlines()[-1:]
+        lines = re.findall(r"^gravier\w*: error: .*$", said, re.M) or said.strip().splitlines()[-1:]
         raise CaseError(f"{directory}: gravier ended with status {done.returncode}: {' '.join(lines)}")
     return done.returncode

@@ -1,23 +1,29 @@
 """Studies of parameters: a case with several values of its keys, a run each."""
 import csv
 import itertools
+import re
 import warnings
 
 import numpy as np
 from whole_file import whole_file
 
 from .case import CaseError, claim, made_directory, run, value_text
+from .results import Run
 
 #: what the table of a study begins with
 HEADER = ("run", "status")
+#: its columns behind those of the keys: solves that missed their goal, and the largest velocity error over U
+JUDGED = ("steps_missed", "worst_error")
 
 
-def study(base, changes, directory, ranks=1):
+def study(base, changes, directory, ranks=1, results=None):
     """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
     `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
     times is (group, name, key), with the `name` of the group, or its number from 1. Keys that change together are a tuple of such keys, whose
     values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row for each run that
-    ended with status 0 or 3: its directory, its exit status and its values. Warns of runs that an older, larger study has left."""
+    ended with status 0 or 3: its directory, its exit status, its values, how many of its steps missed their goal, and its worst velocity error
+    over U, by the last words of its log. `results` is a function of a finished run, a gravier.Run, that returns {column: value}: these columns
+    follow. Warns of runs that an older, larger study has left."""
     points = _points(changes)
     directory = made_directory(directory)
     claim(directory / "study.csv", {".csv": ",".join(HEADER).encode()})
@@ -27,16 +33,44 @@ def study(base, changes, directory, ranks=1):
                       stacklevel=2)
     rows = []
     if points:
-        _write_table(directory / "study.csv", points[0], rows)
+        _write_table(directory / "study.csv", points[0], rows, ())
+    own = None
     for number, point in enumerate(points, 1):
         groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
         for what, value in point.items():
             _group_of(groups, *what)[what[-1]] = value
         place = directory / f"run_{number}"
         status = run(groups, place, ranks)
-        rows.append([place.name, status, *(value if isinstance(value, str) else value_text(value) for value in point.values())])
-        _write_table(directory / "study.csv", point, rows)
+        found = _own_results(results, groups, place, point, own)
+        own = list(found)
+        values = (value if isinstance(value, str) else value_text(value) for value in [*point.values(), *_judged(place), *found.values()])
+        rows.append([place.name, status, *values])
+        _write_table(directory / "study.csv", point, rows, own)
         yield point, place, status
+
+
+def _judged(place):
+    """How many steps of a run missed their goal, and its worst velocity error over U, which are the last words of its log; None where they do not
+    tell it."""
+    said = (place / "terminal.log").read_text(encoding="utf-8", errors="replace")
+    missed = re.search(r"^converged +(?:NO: (\d+) of \d+ solves? did not reach|)", said, re.M)
+    worst = re.search(r"^accuracy +velocity error at most (\S+) of U", said, re.M)
+    return int(missed[1] or 0) if missed else None, float(worst[1]) if worst else None
+
+
+def _own_results(results, groups, place, point, known):
+    """What the function of the user makes of a run, {column: value}; `known` are the columns of the runs before, None for the first one."""
+    if results is None:
+        return {}
+    found = results(Run(place / _group_of(groups, "output", "directory").get("directory", "results")))
+    if not isinstance(found, dict) or not all(isinstance(name, str) for name in found):
+        raise CaseError(f"results of {place.name}: {found!r}; expected a dictionary of values by the names of their columns")
+    if known is not None and set(found) != set(known):
+        raise CaseError(f"results of {place.name}: columns {', '.join(found)}; expected those of the runs before, {', '.join(known)}")
+    taken = {*HEADER, *_key_names(point), *JUDGED}.intersection(found)
+    if taken:
+        raise CaseError(f"results of {place.name}: {', '.join(sorted(taken))}: study.csv has a column of this name; expected another one")
+    return {name: found[name] for name in (found if known is None else known)}
 
 
 def _points(changes):
@@ -61,11 +95,16 @@ def _points(changes):
     return [{key: value for part in parts for key, value in part.items()} for parts in itertools.product(*series)]
 
 
-def _write_table(path, point, rows):
+def _key_names(point):
+    """The columns of the keys that change."""
+    return [".".join(str(part) for part in key) for key in point]
+
+
+def _write_table(path, point, rows, own):
     """The runs that are over, in the place of those known before."""
     with whole_file(path) as part, open(part, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([*HEADER, *(".".join(str(part) for part in key) for key in point)])
+        writer.writerow([*HEADER, *_key_names(point), *JUDGED, *own])
         writer.writerows(rows)
 
 
