@@ -52,7 +52,7 @@ contains
     character(len=:), allocatable :: header
     integer :: v, k, q
 
-    header = case_columns//",vary,value,knee,steps,iterations,failed,residual,max_overlap,mean_radius,position_error,"// &
+    header = case_columns//",vary,value,knee,steps,iterations,failed,residual,largest_overlap,mean_radius,position_error,"// &
       & "position_error_max,velocity_error,force_error,stress_error"
     do q = 1, size(study%quantities)
       header = header//","//study%quantities(q)%text//","//study%quantities(q)%text//"_error"

@@ -60,7 +60,7 @@ contains
     run%contacts = figures%contacts
     run%mean_radius = simulation%decomposition%rule%mean_radius
     run%failed = narrow(simulation%failed)
-    run%residual = simulation%effort%worst
+    run%residual = simulation%tally%worst_residual
     run%overlap = max(simulation%tally%start_overlap, simulation%tally%later_overlap)
     run%iterations = simulation%effort%iterations
     run%solve_seconds = comm%highest(simulation%effort%seconds)
@@ -200,7 +200,7 @@ contains
     run%contacts = figures%contacts
     run%steps = 1
     run%iterations = report%iterations
-    run%residual = report%figure
+    run%residual = report%residual
     run%solve_seconds = report%seconds
     run%diverged = report%status == solve_diverged
     run%failed = merge(0, 1, report%status == solve_converged)

@@ -175,7 +175,7 @@ module gravier_config_table
            unit="Hz", note="required with an oscillation"), &
      key_t("boundary", "phase", kind_real, "0", "", "angle of the oscillation at time 0; 0 without one", unit="rad"), &
      key_t("boundary", "pivot", kind_real, "3*0", "", "the point it turns about", &
-           count=3, unit="m", note="the value of `point`"), &
+           count=3, unit="m", note="the value of `point`; for glued grains the origin"), &
      key_t("boundary", "free", kind_logical, "3*.false.", "", &
            "components of its translation that forces move; the third is `.false.` in 2D", &
            count=3, chooser="shape", chosen=solid_shapes), &

@@ -4,6 +4,7 @@ import csv
 import glob
 import math
 import os
+import pathlib
 import re
 import shutil
 import unittest.mock
@@ -163,6 +164,17 @@ class Columns(Studies):
         run, rows, _ = self.study("missed", COLUMN_CASE, {"kind": "solve"}, "&variant name = 'few', max_iterations = 5 /", status=3)
         self.assertEqual(len(rows), 6)
         self.assertIn("*** 1 of the solves did NOT reach their tolerance", run.stdout)
+
+    def test_residual_and_overlap(self):
+        """The column of the residual has that, where the velocity error ends solves, too; no two columns have one name."""
+        case = merged(DISKS, {"time": {"steps": 20}, "solver": {"criterion": "velocity_error", "tolerance": 0.5}})
+        run, rows, _ = self.study("columns of runs", case, {"kind": "run", "vary": "accuracy", "values": "10.0, 5.0", "samples": 1, "quantities": ["max_overlap"]},
+                                  "&variant name = 'NLGS' /")
+        names = pathlib.Path(run.path("out", "accuracy.csv")).read_text(encoding="utf-8").splitlines()[0].split(",")
+        self.assertEqual(len(names), len(set(names)))
+        for row in rows:
+            self.assertTrue(0.0 < float(row["residual"]) <= 0.5, row)
+            self.assertGreater(float(row["largest_overlap"]), float(row["max_overlap"]))
 
     def test_summary_of_missed_solves(self):
         """The summary says of which variant, and of a reference, solves missed their tolerance."""
