@@ -3,8 +3,8 @@
 !> nothing: of the centre of mass of the free grains, of their spread about it, of the boundaries and of the cell that forces move.
 !>
 !> Velocities are those beside what all boundaries have in common. Where the bodies move as a whole, and by more than the errors of
-!> solves, that is motion and no error. What moves then against the bodies may be error as before: velocities are those beside
-!> their mean velocity.
+!> solves, that is motion and no error. What moves then against the bodies may be error as before: the spread, and the way of
+!> boundaries against the centre of mass.
 !>
 !> The spread is that of a uniform velocity gradient, A = sum m (v - v_c) (x - x_c)^T/(M R), with the centre of mass c, the mass M
 !> and the radius of gyration R of the grains. Its norm is at most the root mean square of v - v_c. Along periodic axes grains have
@@ -75,17 +75,24 @@ contains
     type(velocity_scale_t), intent(in) :: scale
     type(solve_report_t), intent(in) :: solve
     real(dp) :: velocity(9), gradient(9), frame(3), most
+    logical :: as_a_whole
     integer :: b
 
     most = unresolved_times*solve%velocity_error
     if (.not. (scale%apart < most .and. solve%status == solve_converged)) return
     self%steps = self%steps + 1
+    as_a_whole = .not. scale%own < most
     frame(:) = scale%frame
-    if (.not. norm2(scale%mean) < most) frame(:) = scale%frame + scale%mean
+    if (as_a_whole) frame(:) = scale%frame + scale%mean
     if (.not. allocated(self%way)) allocate (self%way(9, of_cell + size(decomposition%boundaries)), source=0.0_dp)
     if (mass > 0.0_dp) then
       call find_motion(decomposition, mass, frame, most, velocity, gradient)
-      call add_way(velocity, physics%h, most, self%way(:, of_centre))
+      if (as_a_whole) then
+        ! loads of the step have changed the mean velocity
+        frame(:) = frame + velocity(1:3)
+      else
+        call add_way(velocity, physics%h, most, self%way(:, of_centre))
+      end if
       call add_way(gradient, physics%h, most, self%way(:, of_spread))
     end if
     if (physics%cell%is_driven) then

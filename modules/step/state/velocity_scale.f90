@@ -8,11 +8,9 @@
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; now, ten steps
 !>            before or ten steps later, which counts where a drive starts or turns round
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
-!>     apart  root mean square velocity of the bodies in contact at the start of the step, beside their mean velocity and that of a
-!>            cell that deforms. Spins of bodies that are no disks or spheres count with their energy, because they bring surfaces
-!>            towards each other
-!>     own    the same beside what all boundaries have in common. Where it is more than five times apart, bodies move as a whole
-!>            and not against each other: it is apart then, unless there is nothing else to compare with
+!>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
+!>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
+!>     apart  the same beside the mean velocity of the bodies: what they move against each other
 !>     stress of bodies that nothing loads or drives and that do not move, but that are wedged between fixed ones: root mean
 !>            square of the normal impulses that the step starts from, over m
 !>     bonds  what the mean strength of bonds that break for good gives to the mean grain in a step
@@ -57,8 +55,6 @@ module gravier_velocity_scale
   !> The part of the velocity that bonds could give to the mean grain in a step which U may have at most: the motion as a whole says
   !> nothing of the forces that bonds have to bear.
   real(dp), parameter :: share_of_bonds = 0.2_dp
-  !> Bodies move as a whole if they move against each other by less than this part of what they move by.
-  real(dp), parameter :: as_a_whole = 0.2_dp
   !> A body is slow if its own scale is below this part of U. Where U_q is 0, an own scale is at least so much of U.
   real(dp), parameter :: slow_part = 0.25_dp, least_own = 1.0e-3_dp
   !> s from which on the kind of a load names springs
@@ -497,7 +493,6 @@ contains
     self%quiet = self%value
     if (self%kind == of_springs) self%quiet = self%load
     if (self%internal .and. .not. self%drive > 0.0_dp) self%quiet = 0.0_dp
-    if (self%quiet > 0.0_dp .and. self%apart < as_a_whole*self%own) self%own = self%apart
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
       self%value = self%share*self%own

