@@ -200,6 +200,7 @@ contains
       // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
       // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
+      // "  tracked_bodies = 17, 203" // newline &
       // "  energy = .true." // newline &
       // "  structure = .true., boundary_forces = .true., vtk = .true. /" // newline
   end function whole_file
@@ -238,6 +239,7 @@ contains
     call check(config%output%final_bodies, "final_bodies")
     call check_equal(config%output%checkpoint_every, 6, "checkpoint_every")
     call check_equal(config%output%fclib_step, 3, "fclib_step")
+    call check(all(config%output%tracked_bodies(:3) == [17, 203, 0]), "tracked_bodies")
     call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
     call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
     call check(asks(config, "energy"), "energy")
@@ -343,6 +345,7 @@ contains
     call check(.not. config%output%final_bodies, "default final_bodies")
     call check_equal(config%output%checkpoint_every, 0, "default checkpoint_every")
     call check_equal(config%output%fclib_step, 0, "default fclib_step")
+    call check(all(config%output%tracked_bodies == 0), "no tracked_bodies by default")
     call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
     call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
     call check(.not. asks(config, "energy"), "default energy")
@@ -893,6 +896,9 @@ contains
     call refuse(column // "&output directory = '' /", &
       "&output directory = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
+    call refuse(column // "&output tracked_bodies = 1, -2 /", &
+      & "&output tracked_bodies = 1, -2: expected at most 8 integers >= 1")
+    call refuse(column // "&output tracked_bodies = 1, 2, 1 /", "expected each identifier once")
     call refuse(column // "&output fclib_step = -1 /", "&output fclib_step = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_seconds = -1 /", &
@@ -1526,7 +1532,7 @@ contains
       // "  radius = 2.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline // "  rotation = 0.0, 0.0, 0.0" // newline &
       // "  oscillation = 0.0, 0.0, 0.0" // newline // "  rotation_oscillation = 0.0, 0.0, 0.0" // newline &
       // "  frequency = 0.0" // newline // "  phase = 0.0" // newline &
-      // "  ! pivot = the value of `point`" // newline // "  free = .false., .true., .false." // newline &
+      // "  ! pivot = the value of `point`; for glued grains the origin" // newline // "  free = .false., .true., .false." // newline &
       // "  force = 0.0, 0.0, 0.0" // newline // "  mass = 3.0" // newline // "  table = ''" // newline &
       // "  table_repeats = .false." // newline &
       // "  friction = 0.5" // newline // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
@@ -1540,7 +1546,7 @@ contains
       // "  rotation = 0.0, 0.0, 0.0" // newline &
       // "  oscillation = 0.0, 0.0, 0.0" // newline // "  rotation_oscillation = 0.0, 0.0, 0.0" // newline &
       // "  frequency = 0.0" // newline // "  phase = 0.0" // newline &
-      // "  ! pivot = the value of `point`" // newline &
+      // "  ! pivot = the value of `point`; for glued grains the origin" // newline &
       // "  free = .false., .false., .false." // newline // "  force = 0.0, 0.0, 0.0" // newline &
       // "  pressure = 0.0" // newline // "  table = ''" // newline &
       // "  table_repeats = .false." // newline &
