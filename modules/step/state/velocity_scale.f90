@@ -183,12 +183,11 @@ contains
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%stiffness = 0.0_dp
     if (sums(9) > 0.0_dp) self%stiffness = sums(8)/sums(9)
-    self%creep = 0.0_dp
     if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call find_motion(decomposition%nd, sums(10:), self%own, self%mean(1:decomposition%nd), self%apart)
     self%frame(:) = motion%common
-    ! nothing holds a scene without boundaries: its mean motion is none
     if (.not. motion%bounded) then
+      ! nothing holds a scene without boundaries: its mean motion is none
       self%frame(:) = self%mean
       self%mean(:) = 0.0_dp
       self%own = self%apart
@@ -255,28 +254,23 @@ contains
     end do
   end subroutine add_masses
 
-  !> The motion of the bodies from its sums.
+  !> The motion of the bodies from its sums: root mean square velocity beside that of the observer, mean velocity (nd), and root
+  !> mean square beside that [m/s].
   pure subroutine find_motion(nd, sums, own, mean, apart)
     integer, intent(in) :: nd
     !> mass, twice the energy beside the velocity of the observer, mass and momentum along each axis (2 + 2 nd)
     real(dp), intent(in) :: sums(:)
-    !> root mean square velocity beside that of the observer, mean velocity (nd), root mean square beside that [m/s]
     real(dp), intent(out) :: own, mean(:), apart
-    real(dp) :: square
     integer :: d
 
-    own = 0.0_dp
+    own = sqrt(sums(2)/max(sums(1), tiny(1.0_dp)))
     mean(:) = 0.0_dp
-    apart = 0.0_dp
-    if (.not. sums(1) > 0.0_dp) return
-    square = sums(2)
+    apart = sums(2)
     do d = 1, nd
-      if (.not. sums(2 + d) > 0.0_dp) cycle
-      mean(d) = sums(2 + nd + d)/sums(2 + d)
-      square = square - mean(d)*sums(2 + nd + d)
+      if (sums(2 + d) > 0.0_dp) mean(d) = sums(2 + nd + d)/sums(2 + d)
+      apart = apart - mean(d)*sums(2 + nd + d)
     end do
-    own = sqrt(sums(2)/sums(1))
-    apart = sqrt(max(square, 0.0_dp)/sums(1))
+    apart = sqrt(max(apart, 0.0_dp)/max(sums(1), tiny(1.0_dp)))
   end subroutine find_motion
 
   !> Mass, twice the energy, and mass and momentum along each axis of the grains at the start of the step. Loads of the step are

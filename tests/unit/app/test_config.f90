@@ -898,7 +898,8 @@ contains
     call refuse(column // "&output every = -1 /", "&output every = -1: expected an integer >= 0")
     call refuse(column // "&output tracked_bodies = 1, -2 /", &
       & "&output tracked_bodies = 1, -2: expected at most 8 integers >= 1")
-    call refuse(column // "&output tracked_bodies = 1, 2, 1 /", "expected each identifier once")
+    call refuse(column // "&output tracked_bodies = 1, 2, 1 /", &
+      & "&output tracked_bodies = 1, 2, 1: expected each identifier once")
     call refuse(column // "&output fclib_step = -1 /", "&output fclib_step = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_seconds = -1 /", &
@@ -1532,7 +1533,8 @@ contains
       // "  radius = 2.0" // newline // "  velocity = 0.0, 0.0, 0.0" // newline // "  rotation = 0.0, 0.0, 0.0" // newline &
       // "  oscillation = 0.0, 0.0, 0.0" // newline // "  rotation_oscillation = 0.0, 0.0, 0.0" // newline &
       // "  frequency = 0.0" // newline // "  phase = 0.0" // newline &
-      // "  ! pivot = the value of `point`; for glued grains the origin" // newline // "  free = .false., .true., .false." // newline &
+      // "  ! pivot = the value of `point`; for glued grains the origin" // newline &
+      // "  free = .false., .true., .false." // newline &
       // "  force = 0.0, 0.0, 0.0" // newline // "  mass = 3.0" // newline // "  table = ''" // newline &
       // "  table_repeats = .false." // newline &
       // "  friction = 0.5" // newline // "  ! restitution = the value of `wall_restitution` of `&scene`" // newline &
