@@ -123,6 +123,17 @@ class Jobs(RunTestCase):
         done = self.sh("gravier_job", "odd_1.nml", GRAVIER_MARGIN="abc")
         self.assertEqual((done.returncode, done.stderr), (2, "gravier_job: error: GRAVIER_MARGIN=abc: expected seconds, 0 or more\n"))
 
+    def test_samples_of_a_list(self):
+        """The samples of a list, one after the other; of one that is refused the error is said."""
+        write(os.path.join(self.work, "grades.csv"), "count,fraction\n20,0.3\n30,0.3\n20,5.0\n")
+        write(os.path.join(self.work, "grade.nml"), "&scene bodies = 'sample' /\n&sample count = @count@, solid_fraction = @fraction@, box = 0.2, radius = 0.01, file = '@run@.h5' /\n"
+              "&time step = 1.0e-3, steps = 0 /\n")
+        done = self.sh("gravier_job", "--list", "grades.csv", "grade.nml", GRAVIER_PROGRAM="gravier_sample")
+        self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
+        for name, made in (("grade_1.h5", True), ("grade_2.h5", True), ("grade_3.h5", False)):
+            self.assertEqual(os.path.exists(os.path.join(self.work, name)), made, name)
+        self.assertIn("grade_3: the run ended with status 2, see grade_3.out: gravier_sample: error: ", done.stderr)
+
     def test_without_a_scheduler_it_goes_on_by_itself(self):
         write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 80}}))
         done = self.sh("sh", "mpirun.sh", RANKS=1, SECONDS_EACH=1.02)
