@@ -23,8 +23,7 @@ STEP = 5.0e-4  # s
 # ratio, time until the gate is taken away [s], times that a fall from the height of the column is waited for, width of the bins in
 # which a heap is measured [mean radii], alert distance [m], about the way of the fastest grain in a step
 PLANE = SimpleNamespace(smallest=0.004, largest=0.006, grains=1000, aspects=(0.5, 0.75, 1.1, 1.6, 3.5, 5.0, 7.0, 10.0), flat=2.0,
-                        tall=3.0, settling=0.4, falls=5.0, bin=4.0, alert=1.5e-3, name="study_collapse",
-                        solver={"acceleration": "none", "tolerance": 2.0e-3, "max_iterations": 500})
+                        tall=3.0, settling=0.4, falls=5.0, bin=4.0, alert=1.5e-3, name="study_collapse", solver={})
 SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, grains=6000, aspects=(0.5, 0.75, 1.1, 1.5, 3.0, 5.0, 8.0, 12.0),
                         flat=1.7, tall=1.7, settling=0.3, falls=4.0, bin=1.0, alert=2.0e-3, name="study_collapse_3d",
                         solver={"tolerance": 2.0e-3, "max_iterations": 200, "acceleration": "momentum"})

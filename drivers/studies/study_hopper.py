@@ -27,8 +27,7 @@ CONSTANT, SHAPE = (0.55, 0.65), {2: 4.0 / np.pi * np.sqrt(2.0), 3: 4.0 / np.pi}
 # radii [m], openings [mean diameters], half of the width [m], height of the loose fill [m], steps of the filling and of a
 # discharge, share of the grains that leaves while the rate is measured, exponent of the law
 PLANE = SimpleNamespace(smallest=0.004, largest=0.006, openings=(7.0, 9.5, 12.0, 15.0, 18.0), half=0.25, height=0.65, filling=800,
-                        discharge=1400, share=0.5, exponent=1.5, name="study_hopper",
-                        solver={"acceleration": "none", "tolerance": 2.0e-3, "max_iterations": 500})
+                        discharge=1400, share=0.5, exponent=1.5, name="study_hopper", solver={})
 SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, openings=(4.5, 5.5, 7.0, 8.5), half=0.08713, height=0.215, filling=800,
                         discharge=2000, share=0.35, exponent=2.5, name="study_hopper_3d",
                         solver={"tolerance": 2.0e-3, "max_iterations": 500, "acceleration": "momentum"})
