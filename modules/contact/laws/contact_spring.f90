@@ -22,8 +22,6 @@ module gravier_contact_spring
     real(dp) :: stiffness(2) = 0.0_dp
     !> of a spring whose force is K x^(3/2) where it is compressed by x: K, and 0 of a linear one [N/m^(3/2)]
     real(dp) :: hertz = 0.0_dp
-    !> of such a spring: the greatest compression of an impact over the velocity^(4/5) with which it begins [m^(1/5) s^(4/5)]
-    real(dp) :: impact = 0.0_dp
     !> of the normal dashpot over that of critical damping; of the tangential dashpot over the normal one
     real(dp) :: damping = 0.0_dp, tangential_damping = 0.0_dp
     !> phi
@@ -31,8 +29,6 @@ module gravier_contact_spring
   contains
     procedure :: yields => spring_yields
     procedure :: energy => spring_energy
-    procedure :: depth => spring_depth
-    procedure :: part_kept => spring_part_kept
   end type spring_t
 
   !> The springs of a contact in one step, with what their state after it is made of.
@@ -83,35 +79,6 @@ contains
     end if
     energy = energy + 0.5_dp*self%stiffness(2)*sum(elongation**2)
   end function spring_energy
-
-  !> The compression that the stiffnesses of a step are taken at, of a spring that stiffens [m]: that of q_m, or, where a contact
-  !> closes, what it may close in the step or what an impact of its velocity compresses it by, whichever is less.
-  pure real(dp) function spring_depth(self, gap, velocity, h) result(depth)
-    class(spring_t), intent(in) :: self
-    !> at q_m [m]; along the normal at the start of the step [m/s]; [s]
-    real(dp), intent(in) :: gap, velocity, h
-    real(dp) :: approach
-
-    approach = max(0.0_dp, -velocity)
-    depth = max(-gap, min(h*approach, self%impact*approach**0.8_dp))
-  end function spring_depth
-
-  !> The part of its elongation that a tangential spring keeps in the next step, where the compression of its contact is `depth`.
-  !> What is added to the area of a contact of spheres bears no shear (Mindlin and Deresiewicz 1953, J. Appl. Mech. 20, 327): the
-  !> stiffness grows with the compression, and the force stays. What is taken away from the area takes its shear along: the
-  !> stiffness falls, and the force with it. So a closed way gives back no more work than was done (Thornton, Cummins and Cleary
-  !> 2013, Powder Technology 233, 30).
-  pure real(dp) function spring_part_kept(self, depth) result(part)
-    class(spring_t), intent(in) :: self
-    !> [m]
-    real(dp), intent(in) :: depth
-    real(dp) :: now
-
-    part = 1.0_dp
-    if (.not. self%hertz > 0.0_dp) return
-    now = (self%stiffness(1)/self%hertz)**2
-    if (depth > now) part = sqrt(now/depth)
-  end function spring_part_kept
 
   !> Set the elongations at q_m of a contact that has kept `kept` of them. A contact that has kept none has none where its bodies
   !> touch, if its velocities bring them together in this step or did so after the q_m of the last one, in which they pressed

@@ -3,8 +3,8 @@
 !>
 !> Over a step the springs are linear: their stiffness is that of the chord from the undeformed contact to a compression that the
 !> start of the step predicts, so that forces are those of Hertz where the compression is at rest, and the error in time is of the
-!> second order. The tangential force stays where the compression grows, and falls with the stiffness where it falls
-!> (gravier_contact_spring).
+!> second order. A contact that closes is taken to be compressed by what it may close in the step, or by what an impact of its
+!> velocity compresses it, whichever is less.
 module gravier_hertz_law
   use gravier_kinds, only: dp
   use gravier_declared_keys, only: declared_key_t
@@ -58,13 +58,14 @@ contains
   pure subroutine hertz_evaluate(self, pair)
     class(hertz_law_t), intent(in) :: self
     type(contact_pair_t), intent(inout) :: pair
-    real(dp) :: depth
+    real(dp) :: depth, approach
 
     call self%begin_pair(pair)
     pair%spring%hertz = self%normal*sqrt(pair%reduced_radius)
-    ! m v^2/2 = 2/5 K x^(5/2)
-    pair%spring%impact = (1.25_dp*pair%reduced_mass/pair%spring%hertz)**0.4_dp
-    depth = max(pair%spring%depth(pair%gap, pair%normal_velocity, pair%h), least*pair%reduced_radius)
+    approach = max(0.0_dp, -pair%normal_velocity)
+    ! the greatest compression of an impact: m v^2/2 = 2/5 K x^(5/2)
+    depth = min(pair%h*approach, (1.25_dp*pair%reduced_mass*approach**2/pair%spring%hertz)**0.4_dp)
+    depth = max(-pair%gap, depth, least*pair%reduced_radius)
     pair%spring%stiffness(1) = pair%spring%hertz*sqrt(depth)
     pair%spring%stiffness(2) = self%tangential*sqrt(pair%reduced_radius*depth)
   end subroutine hertz_evaluate

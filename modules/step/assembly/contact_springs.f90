@@ -3,7 +3,7 @@
 !> plane and as vectors in space; those along the normal are the gaps.
 module gravier_contact_springs
   use gravier_kinds, only: dp
-  use gravier_contact_spring, only: spring_t, spring_step_t
+  use gravier_contact_spring, only: spring_t
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
   use gravier_contact_operator, only: find_local_operator
@@ -161,8 +161,7 @@ contains
   !> Keep the elongations of the springs of a solved problem with the pairs of the lists, as they are at the q_m of the next step;
   !> v_global is evaluated. A contact that sticks is stretched by what its bodies move, whatever the solve has left between its
   !> velocity and its force: an elongation that fitted the force would move away from the bodies step by step. One that slides has
-  !> the elongation that its force has, and one that carries nothing forgets. Of a spring that stiffens in the next step only a part
-  !> is kept; the way of this step counts with the mean of both stiffnesses. In space an elongation turns with the bodies about the
+  !> the elongation that its force has, and one that carries nothing forgets. In space an elongation turns with the bodies about the
   !> normal, half of the way before they stretch it and half after: so it does no work.
   subroutine conclude_springs(problem, h, halo)
     type(contact_problem_t), intent(in) :: problem
@@ -170,7 +169,7 @@ contains
     real(dp), intent(in) :: h
     type(halo_t), intent(inout) :: halo
     real(dp), allocatable :: v(:, :, :)
-    real(dp) :: elongation(2), t(3), s(3), part
+    real(dp) :: elongation(2), t(3), s(3)
     logical :: slides
     integer :: k, c, d, nd
 
@@ -185,12 +184,11 @@ contains
           associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
             slides = uses_its_friction(sub, problem%kernels, c)
-            part = part_kept(own, h, sub%gap(c), v(q, 1, g))
             elongation(:) = own%stretch(1:2)
             if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, 0.5_dp*h, elongation)
             do d = 2, nd
-              elongation(d - 1) = part*elongation(d - 1) + 0.5_dp*(1.0_dp + part)*h*v(q, d, g)
-              if (slides) elongation(d - 1) = part*own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
+              elongation(d - 1) = elongation(d - 1) + h*v(q, d, g)
+              if (slides) elongation(d - 1) = own%elongation(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             end do
           end associate
           if (nd == 2) then
@@ -205,15 +203,6 @@ contains
       end associate
     end do
   end subroutine conclude_springs
-
-  !> The part of its elongation that a spring keeps in the next step, at whose q_m the gap is that of this step and the way of the
-  !> contact.
-  pure real(dp) function part_kept(own, h, gap, velocity) result(part)
-    type(spring_step_t), intent(in) :: own
-    !> [s]; at q_m of this step [m]; along the normal at the end of the step [m/s]
-    real(dp), intent(in) :: h, gap, velocity
-    part = own%spring%part_kept(own%spring%depth(gap + h*velocity, velocity, h))
-  end function part_kept
 
   !> Turn an elongation about the normal as its bodies do in a time h: by the mean of their spins. If bodies do not turn, it stays.
   pure subroutine turn_with_bodies(sub, kernels, c, h, elongation)
@@ -257,7 +246,7 @@ contains
     type(physics_t), intent(in) :: physics
     !> (along the normals and along the tangents; at the start and at the end) [J]
     real(dp), intent(out) :: energies(2, 2)
-    real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after, part
+    real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
     logical :: slides
     integer :: c, d
 
@@ -279,13 +268,10 @@ contains
           slides = uses_its_friction(sub, problem%kernels, c)
           elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
           if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, -0.5_dp*h, elongation)
-          part = part_kept(own, h, sub%gap(c), v(q, 1, g))
           do d = 2, nd
             if (slides) then
               elongation(d - 1) = own%carried(d, h, sub%impulse(q, d, g), v(q, d, g), slides)
             else
-              ! what was kept, as it was with the stiffness of this step
-              if (part < 1.0_dp) elongation(d - 1) = (elongation(d - 1) + 0.5_dp*(part - 1.0_dp)*h*v(q, d, g))/part
               elongation(d - 1) = elongation(d - 1) - (1.0_dp - theta)*h*v(q, d, g)
             end if
           end do

@@ -13,27 +13,10 @@ program test_contact_spring
   call test_dashpot()
   call test_stretches()
   call test_energy()
-  call test_stiffening()
   call test_rebound()
   call finish_checks()
 
 contains
-
-  !> The compression that a spring of Hertz is taken at, and what its tangential spring keeps where it grows or falls.
-  subroutine test_stiffening()
-    type(spring_t) :: spring
-
-    ! taken at a compression of 0.25
-    spring = spring_t(stiffness=[4.0_dp, 1.0_dp], hertz=8.0_dp, impact=0.5_dp)
-    call check_close(spring%depth(-0.3_dp, -1.0_dp, 0.1_dp), 0.3_dp, 0.0_dp, "a contact that is pressed")
-    call check_close(spring%depth(0.1_dp, 2.0_dp, 0.1_dp), 0.0_dp, 0.0_dp, "one that parts")
-    call check_close(spring%depth(0.1_dp, -1.0_dp, 0.1_dp), 0.1_dp, rounding, "one that closes in the step")
-    call check_close(spring%depth(0.1_dp, -1.0_dp, 9.0_dp), 0.5_dp, rounding, "and is compressed by its impact in a part of it")
-    call check_close(spring%part_kept(1.0_dp), 0.5_dp, rounding, "the force stays where the stiffness doubles")
-    call check_close(spring%part_kept(0.01_dp), 1.0_dp, 0.0_dp, "the elongation stays where it falls")
-    spring%hertz = 0.0_dp
-    call check_close(spring%part_kept(1.0_dp), 1.0_dp, 0.0_dp, "and that of a linear spring always")
-  end subroutine test_stiffening
 
   !> Springs with numbers of size 1.
   type(spring_step_t) function step_with(phi) result(step)
