@@ -84,7 +84,7 @@ module gravier_velocity_scale
     real(dp) :: given = 0.0_dp
     !> velocity of the observer: that which all boundaries have in common, or of the whole scene where there are none [m/s]
     real(dp) :: frame(3) = 0.0_dp
-    !> mean velocity beside that of the bodies in contact at the start of the step, by mass [m/s]
+    !> mean velocity of the bodies in contact at the start of the step beside `frame`, by mass [m/s]
     real(dp) :: mean(3) = 0.0_dp
     !> how far from its pivot each boundary reaches grains (boundaries) [m]
     real(dp), allocatable :: lever(:)
