@@ -13,8 +13,8 @@ ARC = numpy.linspace(0.0, 2.0 * numpy.pi, 97)
 ROUNDED = 1e-6
 #: a normal whose component is above this lies along an axis
 ALONG = 0.999
-#: grains of which one may be left out of a frame, the part of them beyond the percentiles on each side, and how many times as large a frame
-#: has to be with those that are far off
+#: a frame leaves grains out only if there are so many of them; the part of them that lies beyond the percentiles on each side; a frame leaves grains
+#: out only if they would make it so many times as large
 MANY, OUTERMOST, TOO_LARGE = 100, 0.005, 3.0
 
 
@@ -122,9 +122,9 @@ def box_around(bodies, walls, points=()):
 
 
 def frame_around(bodies, walls, points=()):
-    """Corners of the box that a picture shows: that around the bodies, some points and the walls, but without grains that are far off along an axis
-    where these make it more than three times as large. Far off is what lies farther beyond the percentiles 0.5 and 99.5 of the places than half of
-    the distance between these."""
+    """Corners of the box that a picture shows. It holds the bodies, some points and the walls. Grains that are far off along an axis are left out if they
+    would make it more than three times as large. Along an axis most grains lie between the percentiles 0.5 and 99.5 of their places. A grain is far
+    off if its distance from the middle of this range is more than the length of the range and a diameter."""
     low, high = box_around(bodies, walls, points)
     shown = numpy.ones(len(bodies), dtype=bool)
     if len(bodies) < MANY:

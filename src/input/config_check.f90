@@ -394,6 +394,7 @@ contains
                 ".false. without final_bodies = .true., whose file holds them")
     call expect(report, config%output%checkpoint_seconds >= 0.0_dp, "output", "checkpoint_seconds", error)
     call expect(report, config%output%walltime >= 0.0_dp, "output", "walltime", error)
+    ! a 0 is an entry that is left out
     associate (tracked => config%output%tracked_bodies)
       call expect(report, all(tracked >= 0), "output", "tracked_bodies", error)
       do i = 1, size(tracked)

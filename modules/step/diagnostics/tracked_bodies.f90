@@ -138,14 +138,14 @@ contains
   subroutine tracked_bodies_columns(self, list)
     class(tracked_bodies_t), intent(in) :: self
     type(column_list_t), intent(inout) :: list
-    character(len=*), parameter :: in_plane(5) = [character(len=5) :: "x", "y", "vx", "vy", "omega"], &
-      & in_space(9) = [character(len=5) :: "x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"]
+    character(len=5) :: names(9)
     integer :: b, i
 
+    names(:) = ["x    ", "y    ", "z    ", "vx   ", "vy   ", "vz   ", "wx   ", "wy   ", "wz   "]
+    if (self%nd == 2) names(1:5) = ["x    ", "y    ", "vx   ", "vy   ", "omega"]
     do b = 1, size(self%id)
       do i = 1, size(self%value, 1)
-        if (self%nd == 2) call list%add("body_"//trim(in_plane(i))//":"//to_text(self%id(b)), self%value(i, b))
-        if (self%nd == 3) call list%add("body_"//trim(in_space(i))//":"//to_text(self%id(b)), self%value(i, b))
+        call list%add("body_"//trim(names(i))//":"//to_text(self%id(b)), self%value(i, b))
       end do
     end do
   end subroutine tracked_bodies_columns
