@@ -257,7 +257,7 @@ module gravier_config_table
            note="1e-2 with `velocity_error`, else 1e-4"), &
      key_t("solver", "fallback", kind_choice, "'none'", "newton none", &
            "method that takes over a solve that stagnates or makes 2000 iterations in vain, if the problem has at most "// &
-           "`fallback_contacts` contacts and neither rolling nor pivoting friction", &
+           "`fallback_contacts` contacts", &
            note="newton with `velocity_error`, else none"), &
      key_t("solver", "fallback_contacts", kind_integer, "10000", ">= 1", &
            "contacts of a problem that `fallback` takes over, at most"), &

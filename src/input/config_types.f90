@@ -118,7 +118,7 @@ module gravier_config_types
     !> newton or none: what takes over a solve that stagnates, and the contacts of its problem, at most
     character(len=choice_length) :: fallback
     integer :: fallback_contacts
-    !> false: newton where the velocity error ends solves and the scene has no moments, none elsewhere
+    !> false: newton where the velocity error ends solves, none elsewhere
     logical :: fallback_given = .false.
     integer :: max_iterations, sweeps, check_every
     !> in (0, 1]

@@ -86,7 +86,7 @@ contains
         text = "velocities are within the accuracy "//to_text(solver%accuracy, 3)//": a larger &solver tolerance, now "// &
           & to_text(solver%tolerance, 3)//", if that is enough"
       else if (tally%stagnated > 0 .and. tally%stagnated + tally%exhausted >= max(tally%unbounded, tally%diverged) .and. &
-        & .not. allocated(fallback%method) .and. solver%method /= "newton" .and. .not. simulation%effects%rolling) then
+        & .not. allocated(fallback%method) .and. solver%method /= "newton") then
         text = "&solver fallback = 'newton' takes over solves that stagnate"
       else if (tally%stagnated < max(tally%exhausted, tally%unbounded, tally%diverged)) then
         text = "a smaller &time step"
@@ -100,7 +100,7 @@ contains
         text = "contacts that yield (&law kind = 'elastic')"
         ! solves with rolling resistance stagnate with a hundredth of the step, too
         if (.not. simulation%effects%rolling) text = "a smaller &time step, or "//text
-        if (solver%method /= "newton" .and. .not. simulation%effects%rolling) text = "&solver method = 'newton', "//text
+        if (solver%method /= "newton") text = "&solver method = 'newton', "//text
       end if
     end associate
   end function mending_text

@@ -129,7 +129,7 @@ contains
     if (allocated(error)) return
     call set_control(self)
     call choose_scheme(config, self%method)
-    call choose_fallback(config, scene%effects, self%fallback)
+    call choose_fallback(config, self%fallback)
     self%decomposition%boundaries = scene%boundaries
     self%decomposition%shapes = scene%shapes
     call self%decomposition%figures%init(scene%shapes)

@@ -37,18 +37,14 @@ contains
   end subroutine choose_scheme
 
   !> Make the method that takes over solves of the first one that stagnate, where there is to be one.
-  subroutine choose_fallback(config, effects, fallback)
+  subroutine choose_fallback(config, fallback)
     type(config_t), intent(in) :: config
-    !> of the scene
-    type(effects_t), intent(in) :: effects
     type(fallback_t), intent(inout) :: fallback
     type(method_options_t) :: options
-    type(method_features_t) :: features
 
     call fallback%free()
     associate (solver => config%solver)
-      features = features_of(trim(solver%fallback))
-      if (features%name == "" .or. solver%fallback == solver%method .or. (effects%rolling .and. .not. features%moments)) return
+      if (solver%fallback == "none" .or. solver%fallback == solver%method) return
       fallback%most_contacts = solver%fallback_contacts
       options%sweeps = solver%sweeps
       call make_method(trim(solver%fallback), options, fallback%method)
@@ -66,8 +62,6 @@ contains
     features = features_of(trim(config%solver%method))
     if (.not. features%moments) call raise(error, status_input, config%file//": &solver method = '"//trim(config%solver%method)// &
       & "': expected "//quoted_names(with_moments, "'", "or")//" with rolling or pivoting friction")
-    if (config%solver%fallback_given .and. config%solver%fallback /= "none") call raise(error, status_input, config%file// &
-      & ": &solver fallback = '"//trim(config%solver%fallback)//"': expected 'none' with rolling or pivoting friction")
     if (config%output%fclib_step > 0) call raise(error, status_input, config%file//": &output fclib_step = "// &
       & to_text(config%output%fclib_step)//": expected 0 with rolling or pivoting friction, which a file of FCLIB cannot say")
   end subroutine check_moments

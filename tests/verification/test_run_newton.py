@@ -87,16 +87,18 @@ class Newton(RunTestCase):
             self.assertLessEqual(run.trace()["residual"][-1], TIGHT)
 
     def test_memory(self):
-        """--check counts the arrays of the method: in 2D with friction a contact has 2 components."""
-        memory = {}
-        for method in ("nlgs", "newton"):
-            run = run_case(merged(self.disks, {"solver": {"method": method}}), directory=self.here("memory " + method),
-                           options=("--check",))
-            self.assert_status(run, 0)
-            memory[method] = dict((name, int(size)) for size, name in re.findall(r"  (\d+) a (contact|body in contact)", run.stdout))
-        # four impulses, a velocity; centre, F and c of 2 numbers, a block of 4 numbers, 5 numbers and a state
-        self.assertEqual(memory["newton"]["contact"] - memory["nlgs"]["contact"], 8 * (4 * 2 + 2 + 3 * 2 + 4 + 5) + 4)
-        self.assertEqual(memory["newton"]["body in contact"] - memory["nlgs"]["body in contact"], 8 * (3 + 3))
+        """--check counts the arrays of the method: in 2D with friction a contact has 2 components, and 3 if it resists rolling."""
+        for n, rolling in ((2, 0.0), (3, 0.1)):
+            memory = {}
+            for method in ("nlgs", "newton"):
+                run = run_case(merged(self.disks, {"solver": {"method": method}, "scene": {"rolling_friction": rolling}}),
+                               directory=self.here(f"memory {method} {n}"), options=("--check",))
+                self.assert_status(run, 0)
+                memory[method] = dict((name, int(size)) for size, name in re.findall(r"  (\d+) a (contact|body in contact)", run.stdout))
+            # four impulses, a velocity; centre, F, c, softness and direction, a block; what is left of a part that is cut; two marks
+            self.assertEqual(memory["newton"]["contact"] - memory["nlgs"]["contact"],
+                             8 * (4 * n + n + 5 * n + n**2 + n - 1) + 4 * (1 + n - 1))
+            self.assertEqual(memory["newton"]["body in contact"] - memory["nlgs"]["body in contact"], 8 * (3 + 3))
 
     def test_light_beside_heavy(self):
         """A heap of light disks beside two heavy ones, by whose weight the residual is rounding long before the light ones have their

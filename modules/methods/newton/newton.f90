@@ -15,7 +15,7 @@ module gravier_newton
   use gravier_method, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_nscdd, only: nscdd_t
-  use gravier_proximal_law, only: proximal_law_t
+  use gravier_proximal_law, only: proximal_law_t, parts_of
   use gravier_proximal_weight, only: proximal_weight_t
   use gravier_sweep_turns, only: sweep_turns_t
   use gravier_enriched_matrix, only: enriched_matrix_t
@@ -79,7 +79,8 @@ contains
   pure function newton_features() result(features)
     type(method_features_t) :: features
     features = method_features_t(name="newton", &
-      & meaning="accelerated sweeps of NSCDD and, where they stagnate, a proximal Newton method", direct_interface_only=.true.)
+      & meaning="accelerated sweeps of NSCDD and, where they stagnate, a proximal Newton method", moments=.true., &
+      & direct_interface_only=.true.)
   end function newton_features
 
   subroutine newton_set(self, options)
@@ -98,8 +99,8 @@ contains
     call self%nscdd_t%held(nc, nv, held)
     call held%add("impulses of Newton's method", .true., 8, 4*nc)
     call held%add("velocity of Newton's method", .true., 8, nc)
-    call held%add("law of Newton's method", .true., 8, 3*nc + nc**2 + 5)
-    call held%add("state of Newton's method", .true., 4, 1)
+    call held%add("law of Newton's method", .true., 8, 5*nc + nc**2 + parts_of(nc, nv))
+    call held%add("state of Newton's method", .true., 4, parts_of(nc, nv) + 1)
     call held%add("velocity of the sweeps of Newton's method", .false., 8, nv)
     call held%add("velocity of Newton's steps", .false., 8, nv)
   end subroutine newton_held

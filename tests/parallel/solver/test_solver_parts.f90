@@ -25,7 +25,7 @@ program test_solver_parts
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_vain_impulses, only: are_in_vain, speed_against
   use gravier_creeping_groups, only: creep_t, find_creep
-  use gravier_proximal_law, only: proximal_law_t
+  use gravier_proximal_law, only: proximal_law_t, parts_of
   use gravier_newton, only: newton_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_interface_problem, only: interface_field_t, make_field
@@ -61,8 +61,10 @@ program test_solver_parts
   call check_stagnation()
   call check_creep(1)
   call check_creep(2)
-  call check_law(2)
-  call check_law(3)
+  call check_law(2, rolling=.false.)
+  call check_law(3, rolling=.false.)
+  call check_law(2, rolling=.true.)
+  call check_law(3, rolling=.true.)
   call check_newton()
   call check_feedback(0.0_dp, 0.8125_dp)
   call check_feedback(2.0_dp, 1.0_dp)
@@ -75,21 +77,29 @@ program test_solver_parts
 contains
 
   !> A column of disks of radius 1 and mass 1 under gravity 1, in a step of 1: the contact below disk k of n bears n + 1 - k.
-  subroutine make_column(n, subdomains, more, sim, dimension)
+  subroutine make_column(n, subdomains, more, sim, dimension, rolling)
     integer, intent(in) :: n, subdomains
     !> other groups
     character(len=*), intent(in) :: more
     type(simulation_t), intent(inout) :: sim
     integer, intent(in), optional :: dimension
+    !> moments resist rolling and, in space, pivoting
+    logical, intent(in), optional :: rolling
     type(config_t) :: config
     type(error_t), allocatable :: error
     type(step_figures_t) :: figures
+    character(len=:), allocatable :: moments
     integer :: nd
 
     nd = 2
     if (present(dimension)) nd = dimension
+    moments = ""
+    if (present(rolling)) then
+      if (rolling) moments = ", rolling_friction = 0.2"
+      if (rolling .and. nd == 3) moments = moments//", pivoting_friction = 0.1"
+    end if
     call parse_config("column", "&scene dimension = "//to_text(nd)//", bodies = 'column', column_count = "//to_text(n)// &
-      & ", gravity = 0, "//trim(merge("-1   ", "0, -1", nd == 2))//", friction = 0.3 /"//newline// &
+      & ", gravity = 0, "//trim(merge("-1   ", "0, -1", nd == 2))//", friction = 0.3"//moments//" /"//newline// &
       & "&time step = 1.0, steps = 1 /"//newline//"&decomposition subdomains = "//to_text(subdomains)//" /"//newline//more, &
       & config, error)
     if (.not. allocated(error)) call sim%init(comm, config, error)
@@ -695,23 +705,25 @@ contains
     call check_equal(verdict, residual_ends, "velocities within the accuracy")
   end subroutine check_verdict
 
-  !> F is 0 where impulses and velocities obey the law, whether contacts are open, stick or slip; near by, the step dr = c - L dv
-  !> leaves of F what is of second order in its distance.
-  subroutine check_law(dimension)
+  !> F is 0 where impulses and velocities obey the law, whether contacts are open, or stick, slide, roll and pivot or not; near by,
+  !> the step dr = c - L dv leaves of F what is of second order in its distance.
+  subroutine check_law(dimension, rolling)
     integer, intent(in) :: dimension
+    logical, intent(in) :: rolling
     real(dp), parameter :: alpha = 0.3_dp, away = 1.0e-5_dp
     type(simulation_t) :: sim
     type(proximal_law_t) :: law
     real(dp), allocatable :: v(:, :, :), dv(:, :, :), dr(:, :, :)
-    real(dp) :: way(dimension - 1), square, before, mu
-    integer :: s, c, q, g, i, nc
+    real(dp) :: square, before
+    integer :: s, c, q, g, i, nf
 
     call make_column(6, 1, "&boundary shape = 'plane', normal = "//trim(merge("1, 0   ", "1, 0, 0", dimension == 2))// &
       & ", point = "//trim(merge("-1, 0   ", "-1, 0, 0", dimension == 2))//" /"//newline//"&solver method = 'nscdd' /", sim, &
-      & dimension)
+      & dimension, rolling)
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels)
-        nc = kernels%nc
+      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels, row => sim%problem%kernels%row)
+        nf = kernels%nf
+        call check_equal(parts_of(kernels%nc, kernels%nv), merge(dimension, 1, rolling), "parts that the normal impulse bounds")
         call law%init(kernels, sub)
         allocate (v, dv, dr, mold=sub%impulse)
         v(:, :, :) = 0.0_dp
@@ -719,29 +731,19 @@ contains
         do c = 1, sub%n_contacts
           q = lane_of(c)
           g = block_of(c)
-          mu = sub%hot(q, kernels%friction_row, g)
           ! shifts are those of no scene here
-          sub%hot(q, kernels%nd + 1, g) = 0.01_dp*c
-          do i = 1, dimension - 1
-            way(i) = hash_uniform(1, int(c, i8), i) - 0.5_dp
-          end do
-          way(:) = way/norm2(way)
+          sub%hot(q, row%shift, g) = 0.01_dp*c
           sub%impulse(q, 1, g) = merge(0.0_dp, 1.0_dp + 0.1_dp*c, mod(c, 3) == 0)
-          sub%impulse(q, 2:, g) = 0.0_dp
-          v(q, 1, g) = -sub%hot(q, kernels%nd + 1, g)
-          select case (mod(c, 3))
-          case (0)
-            v(q, 1, g) = v(q, 1, g) + 0.5_dp
-            v(q, 2:, g) = 0.2_dp*way
-          case (1)
-            sub%impulse(q, 2:, g) = 0.5_dp*mu*sub%impulse(q, 1, g)*way
-          case (2)
-            sub%impulse(q, 2:, g) = mu*sub%impulse(q, 1, g)*way
-            v(q, 2:, g) = -0.2_dp*way
-          end select
-          do i = 1, nc
+          v(q, 1, g) = -sub%hot(q, row%shift, g) + merge(0.5_dp, 0.0_dp, mod(c, 3) == 0)
+          call obey(c, sub%hot(q, row%friction, g)*sub%impulse(q, 1, g), sub%impulse(q, 2:nf, g), v(q, 2:nf, g), mod(c, 2) == 0)
+          do i = 1, kernels%nc
             dv(q, i, g) = away*(hash_uniform(2, int(c, i8), i) - 0.5_dp)
           end do
+          if (.not. rolling) cycle
+          call obey(c, sub%hot(q, row%rolling_friction, g)*sub%impulse(q, 1, g), sub%impulse(q, nf + 1:2*nf - 1, g), &
+            & v(q, nf + 1:2*nf - 1, g), mod(c, 4) < 2)
+          if (dimension == 3) call obey(c, sub%hot(q, row%pivoting_friction, g)*sub%impulse(q, 1, g), sub%impulse(q, 6:6, g), &
+            & v(q, 6:6, g), mod(c, 8) < 4)
         end do
         law%centre(:, :, :) = sub%impulse
         call law%evaluate(kernels, sub, v, alpha, square)
@@ -761,6 +763,23 @@ contains
     end do
     call sim%free()
   end subroutine check_law
+
+  !> A part of the impulse of contact `c` within its bound, and no velocity, or at its bound against a velocity.
+  subroutine obey(c, bound, impulse, velocity, at_bound)
+    integer, intent(in) :: c
+    real(dp), intent(in) :: bound
+    real(dp), intent(out) :: impulse(:), velocity(:)
+    logical, intent(in) :: at_bound
+    real(dp) :: way(size(impulse))
+    integer :: i
+
+    do i = 1, size(way)
+      way(i) = hash_uniform(1, int(c, i8), i) - 0.5_dp
+    end do
+    way(:) = way/norm2(way)
+    impulse(:) = merge(1.0_dp, 0.5_dp, at_bound)*bound*way
+    velocity(:) = merge(-0.2_dp, 0.0_dp, at_bound)*way
+  end subroutine obey
 
   !> Newton's method finds the impulses of a column, to a tolerance that sweeps do not reach in so few iterations.
   subroutine check_newton()

@@ -42,7 +42,7 @@ contains
     call check_equal(method_words(that_relax), "schwarz schwarz_ec", "words of those with a relaxation factor")
     call check_equal(quoted_names(that_decompose, "'", "or"), "'schwarz', 'schwarz_ec', 'nscdd', 'nscdd_ep' or 'newton'", &
       & "those on subdomains")
-    call check_equal(quoted_names(with_moments, "'", "or"), "'nlgs', 'schwarz' or 'nscdd'", "those with moments")
+    call check_equal(quoted_names(with_moments, "'", "or"), "'nlgs', 'schwarz', 'nscdd' or 'newton'", "those with moments")
     call check_equal(quoted_names(accelerated, "`", "and"), "`nlgs` and `nscdd`", "those with momentum by default")
     call check_equal(quoted_names(accelerated_on_active, "`", "and"), "`nscdd_ep`", "one name alone")
   end subroutine test_names

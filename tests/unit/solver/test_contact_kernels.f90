@@ -8,6 +8,7 @@ program test_contact_kernels
   use gravier_contact_data, only: lanes, n_blocks, lane_of, block_of
   use gravier_contact_vectors, only: contact_jacobian, global_impulse, tangents, local_operator, rolling_radius, global_moment
   use gravier_contact_kernels, only: kernels_t
+  use gravier_contact_operator, only: rolling_operator
   use gravier_test_contact_columns, only: contact_column, put_contact_column, same_contacts
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -230,6 +231,11 @@ contains
           call check_close(moment(d), sum(candidate(kernels%nf + 1:, kernels%nd + d)*r(kernels%nf + 1:)), rounding, &
             & "moment of a contact")
         end do
+        associate (i => problem%pair(1, c), j => problem%pair(2, c), turn => kernels%nd + 1)
+          call check_close(rolling_operator(kernels, problem%pair, problem%hot, c, problem%weight), &
+            & sum(candidate(kernels%nc, turn:)**2)*problem%weight(turn, i) + sum(antagonist(kernels%nc, turn:)**2) &
+            & *problem%weight(turn, j), rounding, "relative spin by a moment of one")
+        end associate
       end do
     end associate
     call check_close(rolling_radius(1.0_dp, 3.0_dp), 0.75_dp, rounding, "effective radius of two grains")
