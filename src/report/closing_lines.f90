@@ -186,8 +186,13 @@ contains
       iterations = checks%times()*real(effort%iterations, dp)
       text = "about "//to_text(iterations, 2)//" iterations, "//to_text(comm%highest(effort%seconds_of(iterations)), 2)// &
         & " s, by "//counted(checks%made, "solve")//" continued to it"
-      if (checks%reached < checks%made) text = text//", or more: "//counted(checks%made - checks%reached, "check")// &
+      if (effort%often_idle()) then
+        text = "at most "//text//": "//to_text(nint(100.0_dp*real(effort%idle, dp)/real(effort%solves, dp)))// &
+          & " % of the solves needed no iteration, and solves of a run at that goal start from better impulses"
+      else if (checks%reached < checks%made) then
+        text = text//", or more: "//counted(checks%made - checks%reached, "check")// &
         & trim(merge(" was ", " were", checks%made - checks%reached == 1))//" given up"
+      end if
     end associate
   end function checked_text
 

@@ -1,7 +1,8 @@
 !> The contact law of one subdomain as an equation to which Newton's method applies, in its proximal form.
 !>
 !> With the projection P of Alart and Curnier (gravier_friction_cone: P_n = max(x_n, 0), P_t = x_t cut to the disc of radius
-!> mu P_n, and the moments that resist rolling and pivoting likewise, each to the disc of its own coefficient), s the diagonal of the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
+!> mu P_n, and the moments that resist rolling and pivoting likewise, each to the disc of its own coefficient), s the diagonal of
+!> the undivided local operator, v~ the velocity with its shift and r_k the centre of a proximal point,
 !>   F(r, v) = r - P(x),   x = r - (v~ + alpha s (r - r_k))/(b s):
 !> F = 0 says that r and v~ + alpha s (r - r_k) satisfy Signorini's condition and Coulomb's law, and for r = r_k that r and v~ do.
 !> b = 1 gives the function of gravier_alart_curnier, b = alpha the augmented Lagrangian, in which x is a function of v alone;

@@ -29,7 +29,8 @@ module gravier_convergence_history
 
   !> Many solves with one tolerance.
   type :: effort_t
-    integer(i8) :: solves = 0, iterations = 0
+    !> solves, those of them without an iteration, iterations
+    integer(i8) :: solves = 0, idle = 0, iterations = 0
     !> solves that did not get down to each level
     integer(i8) :: unreached(at_tolerance:tenfold) = 0
     !> iterations of the others down to it
@@ -44,6 +45,7 @@ module gravier_convergence_history
     procedure :: looser_range => effort_looser_range
     procedure :: tighter_range => effort_tighter_range
     procedure :: sees_decay => effort_sees_decay
+    procedure :: often_idle => effort_often_idle
     procedure :: seconds_of => effort_seconds_of
   end type effort_t
 
@@ -86,6 +88,7 @@ contains
     integer :: k
 
     self%solves = self%solves + 1
+    if (iterations == 0) self%idle = self%idle + 1
     self%iterations = self%iterations + iterations
     self%worst = max(self%worst, figure)
     self%seconds = self%seconds + seconds
@@ -106,6 +109,14 @@ contains
     iterations = unknown_effort
     if (self%unreached(tenfold) == 0) iterations = real(self%reached(tenfold), dp)
   end function effort_looser
+
+  !> Whether so many solves found nothing to do that a run at a tighter goal, whose solves start from better impulses, finds little
+  !> to do either.
+  pure logical function effort_often_idle(self) result(often)
+    class(effort_t), intent(in) :: self
+
+    often = real(self%idle, dp) >= many_idle*real(self%solves, dp)
+  end function effort_often_idle
 
   !> Whether the last decade above the tolerance was seen: a fair fraction of the iterations lies in it.
   pure logical function effort_sees_decay(self) result(sees)

@@ -41,7 +41,8 @@ contains
     end if
   end subroutine find_local_operator
 
-  !> W_rr of contact `c` of kernels with rolling [1/kg]: its relative spin times R*, for a moment of R* about any axis; 0 where neither body turns.
+  !> W_rr of contact `c` of kernels with rolling [1/kg]: its relative spin times R*, for a moment of R* about any axis; 0
+  !> where neither body turns.
   pure real(dp) function rolling_operator(kernels, pair, hot, c, weight) result(w)
     type(kernels_t), intent(in) :: kernels
     !> (2, lanes*blocks), (lanes, nh, blocks): see gravier_contact_kernels
@@ -56,8 +57,8 @@ contains
     w = hot(lane_of(c), kernels%row%rolling_radius, block_of(c))**2*(weight(turning, pair(1, c)) + weight(turning, pair(2, c)))
   end function rolling_operator
 
-  !> `find_local_operator` between bodies with shapes, by the rows of H^T, of which W = H^T M^-1 H is made; W_tt is the largest eigenvalue of its
-  !> tangential block.
+  !> `find_local_operator` between bodies with shapes, by the rows of H^T, of which W = H^T M^-1 H is made; W_tt is the largest
+  !> eigenvalue of its tangential block.
   pure subroutine operator_between_shapes(kernels, pair, hot, c, weight, w)
     type(kernels_t), intent(in) :: kernels
     !> (2, lanes*blocks), (lanes, nh, blocks): see gravier_contact_kernels

@@ -6,7 +6,8 @@
 !>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
 !>            root mean square of what applied forces add to velocities; of attractions, where there is no other load
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; now, ten steps
-!>            before or ten steps later, which counts where a drive starts or turns round
+!>            before or ten steps later, which counts where a drive starts or turns round; its mean while tables move grains by
+!>            0.01 d
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
 !>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
@@ -32,7 +33,7 @@ module gravier_velocity_scale
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_boundary_levers, only: find_levers
-  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
+  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed, unseen
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
@@ -49,8 +50,6 @@ module gravier_velocity_scale
   !> Bodies count as wedged if they move by less than this part of the velocity that the impulses of a step would give to the mean
   !> grain. After impacts they move by half of it and more.
   real(dp), parameter :: little_motion = 0.2_dp
-  !> diameters by which grains may drift in the simulated time
-  real(dp), parameter :: drift = 0.01_dp
 
   !> The part of the velocity that bonds could give to the mean grain in a step which U may have at most: the motion as a whole says
   !> nothing of the forces that bonds have to bear.
@@ -183,7 +182,7 @@ contains
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%stiffness = 0.0_dp
     if (sums(9) > 0.0_dp) self%stiffness = sums(8)/sums(9)
-    if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
+    if (self%duration > 0.0_dp) self%creep = unseen*self%diameter/self%duration
     call find_motion(decomposition%nd, sums(10:), self%own, self%mean(1:decomposition%nd), self%apart)
     self%frame(:) = motion%common
     if (.not. motion%bounded) then
@@ -443,7 +442,8 @@ contains
     end do
   end function velocity_scale_load_of
 
-  !> Force on a boundary over the area that it works on [Pa, N/m in 2D]; 0 where no force moves it.
+  !> Force on a boundary over the area that it works on, at least d^2 (d in 2D): a smaller one presses on one grain with all of its
+  !> force [Pa, N/m in 2D]; 0 where no force moves it.
   pure real(dp) function velocity_scale_pressure_of(self, nd, boundary, time, area) result(pressure)
     class(velocity_scale_t), intent(in) :: self
     integer, intent(in) :: nd
@@ -455,7 +455,7 @@ contains
     pressure = 0.0_dp
     if (.not. (boundary%is_driven() .and. boundary%present .and. area > 0.0_dp) .or. self%diameter <= 0.0_dp) return
     call boundary%applied_force(nd, time, area, force)
-    pressure = norm2(force)/area
+    pressure = norm2(force)/max(area, self%diameter**(nd - 1))
   end function velocity_scale_pressure_of
 
   !> The rule.
