@@ -191,7 +191,7 @@ contains
           & " % of the solves needed no iteration, and solves of a run at that goal start from better impulses"
       else if (checks%reached < checks%made) then
         text = text//", or more: "//counted(checks%made - checks%reached, "check")// &
-        & trim(merge(" was ", " were", checks%made - checks%reached == 1))//" given up"
+          & trim(merge(" was ", " were", checks%made - checks%reached == 1))//" given up"
       end if
     end associate
   end function checked_text

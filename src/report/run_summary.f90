@@ -100,7 +100,6 @@ contains
         text = "contacts that yield (&law kind = 'elastic')"
         ! solves with rolling resistance stagnate with a hundredth of the step, too
         if (.not. simulation%effects%rolling) text = "a smaller &time step, or "//text
-        if (solver%method /= "newton") text = "&solver method = 'newton', "//text
       end if
     end associate
   end function mending_text

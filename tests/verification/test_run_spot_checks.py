@@ -79,6 +79,19 @@ class SpotChecks(RunTestCase):
         taken = tight.history()["iterations"].sum()
         self.assertLess(abs(np.log2(foretold / taken)), 1.0, (foretold, taken))
 
+    def test_foretold_at_rest(self):
+        """Where many solves find nothing to do, those of a run at less error do not either: what checks foretell is called a bound."""
+        case = merged(SETTLING, {"time": {"steps": 3000}, "solver": {"method": "nlgs"}, "decomposition": {"subdomains": 1}})
+        run = run_case(case, 1, self.here("loose"))
+        self.assert_status(run, 0)
+        said = re.search(r"\n +at accuracy 1.00E-02: at most about (\S+) iterations, \S+ s, by \d+ solves continued to it: (\d+) % of the solves needed "
+                         r"no iteration, and solves of a run at that goal start from better impulses\n", run.stdout)
+        self.assertTrue(said, run.stdout)
+        self.assertEqual(int(said[2]), round(100.0 * np.mean(run.history()["iterations"] == 0)))
+        tight = run_case(merged(case, {"solver": {"accuracy": 0.01, "spot_checks": 0.0}}), 1, self.here("tight"))
+        self.assert_status(tight, 0)
+        self.assertLess(tight.history()["iterations"].sum(), float(said[1]))
+
     def test_refused(self):
         for solver, text in (({"spot_checks": 1.5}, "&solver spot_checks = 1.5: expected a finite real number in [0, 1]"),
                              ({"spot_checks": 0.1, "criterion": "residual"},

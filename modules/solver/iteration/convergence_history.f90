@@ -12,6 +12,8 @@ module gravier_convergence_history
   real(dp), parameter :: unknown_effort = -1.0_dp
   !> iterations spent below ten times the tolerance, over all of them: less is too little to judge a decay by
   real(dp), parameter :: least_share = 0.3_dp
+  !> solves without an iteration, over all, from which on a scene counts as one that rests
+  real(dp), parameter :: many_idle = 0.2_dp
   !> ends of the intervals, from runs with all three goals (doc/accuracy.md): iterations of a looser goal, over those to the first
   !> figure that passed it, and of a tighter one over the last decade's and over a power law at least and at most
   real(dp), parameter :: least_looser = 0.5_dp, least_tighter = 0.8_dp, most_tighter = 2.0_dp

@@ -359,6 +359,11 @@ contains
     scene = scene_t(nd=nd, pressure=1000.0_dp)
     call assemble(comm, scene, sim)
     call check_scale(sim, step*1000.0_dp*(2.0_dp*radius)**(nd - 1)/mass, "load of a step", "pressure")
+    ! on a plate that is smaller than a grain all of its force acts on one grain
+    call check_close(sim%velocity_scale%pressure_of(nd, pressed_plate(1000.0_dp), 0.0_dp, 1.0e-3_dp*radius), &
+      & 1000.0_dp/(2.0_dp*radius)**(nd - 1), rounding*1000.0_dp/(2.0_dp*radius)**(nd - 1), "a plate smaller than a grain")
+    call check_close(sim%velocity_scale%pressure_of(nd, pressed_plate(1000.0_dp), 0.0_dp, 1.0e3_dp*radius), 1.0_dp/radius, &
+      & rounding/radius, "a large plate")
     ! attraction is an internal force where there is another load
     scene = scene_t(nd=nd, adhesion=3.0_dp, gravity=1.0e-3_dp)
     call assemble(comm, scene, sim)
@@ -381,6 +386,16 @@ contains
     call check_scale(sim, 0.5_dp*creep, "load of a step", "attraction that is weaker than creep")
     call check_close(sim%velocity_scale%own, 0.0_dp, rounding*creep, "at rest under attraction nothing moves")
   end subroutine test_loads
+
+  !> A boundary that a force moves along z.
+  function pressed_plate(force) result(boundary)
+    real(dp), intent(in) :: force
+    type(boundary_t) :: boundary
+
+    boundary = plane(1, [0.0_dp, 0.0_dp, 0.0_dp], [0.0_dp, 1.0_dp, 0.0_dp])
+    boundary%free(2) = .true.
+    boundary%drive%force(2) = -force
+  end function pressed_plate
 
   subroutine test_drives(nd)
     integer, intent(in) :: nd

@@ -117,6 +117,9 @@ contains
       call check((index(mending_text(simulation), "smaller &time step") > 0) .eqv. round == 0, "a smaller step but with rolling")
       call check(index(mending_text(simulation), "contacts that yield") > 0, "contacts that yield where solves stagnate")
     end do
+    ! Newton's method has failed as the second one: it is not offered as the first
+    simulation%config%solver%method = "nlgs"
+    call check(index(mending_text(simulation), "newton") == 0, "a method that has failed is not offered")
     call simulation%free()
   end subroutine test_misses
 

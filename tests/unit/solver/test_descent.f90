@@ -3,7 +3,7 @@ program test_descent
   use mpi_f08, only: MPI_Init, MPI_Finalize
   use gravier_kinds, only: dp, i8
   use gravier_convergence_history, only: convergence_history_t, effort_t, tenfold, unknown_effort
-  use gravier_check, only: check_close, check_equal, finish_checks
+  use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
 
   real(dp), parameter :: rounding = 1.0e-12_dp
@@ -120,7 +120,11 @@ contains
 
     call add_solves(effort, 5, 10, warm)
     call check_close(effort%looser(), 50.0_dp, rounding, "warm solves: looser")
-    call add_solves(effort, 5, 10, idle)
+    call check(.not. effort%often_idle(), "no solve is idle")
+    call add_solves(effort, 1, 10, idle)
+    call check(.not. effort%often_idle(), "a sixth of the solves is idle")
+    call add_solves(effort, 4, 10, idle)
+    call check(effort%often_idle(), "half of the solves are idle")
     call check_close(effort%looser(), 50.0_dp, rounding, "idle solves: looser")
     call check_range(effort, .true., 25.0_dp, real(effort%iterations, dp), "idle solves: looser")
     call check_equal(effort%solves, 10_i8, "warm and idle solves")
