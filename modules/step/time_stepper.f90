@@ -35,7 +35,7 @@ module gravier_time_stepper
   use gravier_overlap_projection, only: project_overlaps
   use gravier_sleeping, only: sleeping_rule_t, count_rest
   use gravier_borne_impulses, only: take_back
-  use gravier_waking, only: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
+  use gravier_waking, only: resting_t, watch_step, watch_awake, wake_disturbed, wake_left_behind, wake_all
   use gravier_whole_problem, only: build_whole, make_whole, take_whole
   use gravier_impulse_memory, only: keep_impulses, recall_impulses
   use gravier_memory_carrying, only: carry_memory
@@ -259,7 +259,7 @@ contains
     figures%divided = repartition_is_due(self%division, self%step, self%imbalance, self%reached_imbalance)
     figures%listed = listed .or. figures%divided
     call list_neighbours(self, figures)
-    if (self%sleeping%after > 0) call watch_awake(self%decomposition, self%halo, self%resting)
+    if (self%sleeping%after > 0) call watch_step(self%sleeping, self%step + 1, self%decomposition, self%halo, self%resting)
     call stop_timer(phase_neighbourhood)
     call set_up(self, figures)
     if (figures%divided) then

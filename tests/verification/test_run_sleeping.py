@@ -72,6 +72,34 @@ class Sleeping(RunTestCase):
         rise = results[f"/steps/{round(end / 1e-3)}/bodies/position"][:, 1] - results["/steps/0/bodies/position"][:, 1]
         self.assertLess(np.abs(rise / (speed * (end - begin)) - 1.0).max(), 0.05)
 
+    def test_loads_that_change_slowly(self):
+        """Changes that wake no body reach the ground in the end: columns that grow disk by disk, and a lid whose load rises. The floor then bears all
+        of it to 4 %, which is within an accuracy of a tenth of the load of a step. Earlier it bore a third of 24 disks."""
+        count, every, gap = 24, 60, 1e-9
+        first = write(f"{self.scratch}/first.csv", bodies_csv([Grain([0.0, RADIUS], radius=RADIUS, mass=2500.0 * np.pi * RADIUS**2)]))
+        entries = [{"name": f"disk {k}", "region": "ball", "centre": [0.0, RADIUS * (2 * k + 1) + gap * (k + 1)],
+                    "region_radius": RADIUS + 0.5 * gap, "radius": RADIUS, "count": 1, "start": 1e-3 * every * k} for k in range(1, count)]
+        column = write(f"{self.scratch}/twenty.csv", bodies_csv([Grain([0.0, (2 * k + 1) * RADIUS], radius=RADIUS, mass=1.0) for k in range(20)]))
+        load = write(f"{self.scratch}/load.csv", f"time,fy\n0,0\n0.3,0\n1.3,{-20 * 9.81}\n")
+        output = {"directory": "results", "every": 0, "boundary_forces": True}
+        floor = {**plane([0, 0], [0, 1]), "name": "floor"}
+        grown = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": first, "density": 2500.0, "alert_distance": 0.1 * RADIUS},
+            "boundary": [floor, plane([-1.0005 * RADIUS, 0], [1, 0]), plane([1.0005 * RADIUS, 0], [-1, 0])], "insertion": entries,
+            "time": {"step": 1e-3, "steps": every * (count + 4)}, "solver": {"sleeping": True}, "output": output}
+        loaded = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": column, "friction": 0.3},
+            "boundary": [floor, {**plane([0, 40 * RADIUS], [0, -1]), "name": "lid", "free": [False, True], "mass": 1.0, "table": load}],
+            "time": {"step": 1e-3, "steps": 2000}, "solver": {"sleeping": True}, "output": output}
+        weight = 2500.0 * np.pi * RADIUS**2 * 9.81
+        for name, case, right in (("grown", grown, count * weight), ("loaded", loaded, 41 * 9.81)):
+            with self.subTest(name):
+                run = run_case(case, 1, f"{self.scratch}/{name}")
+                self.assert_status(run, 0)
+                history = run.history()
+                self.assertGreater(history["sleeping"].max(), 15)
+                self.assertLess(abs(history["force_y:floor"][-100:].mean() / -right - 1.0), 0.04)
+
     def test_contacts_at_an_early_end(self):
         """A plate pushes a disk along until the run ends by it, beside a column that sleeps: all contacts are written as in the middle of
         the last step, as they are where nothing sleeps."""

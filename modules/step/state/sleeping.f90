@@ -17,7 +17,7 @@ module gravier_sleeping
   use gravier_narrow, only: narrow
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_body_mass, only: inverse_of_translation
+  use gravier_body_mass, only: inverse_of_translation, multiply_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
@@ -44,6 +44,8 @@ module gravier_sleeping
     logical, allocatable :: rests(:)
     !> steps at rest, with this one (n_grains); places in the view (n_columns)
     integer, allocatable :: steps(:), seen(:)
+    !> velocities that the step leaves to those that come to stand still (nv, n_grains) [m/s, rad/s]
+    real(dp), allocatable :: left(:, :)
   end type rest_t
 
   type :: sleeping_rule_t
@@ -92,6 +94,7 @@ contains
         call problem%shared%sum_copies(s, own%restless, mean=.false.)
         call find_seen(view%list, sub, own%seen)
         allocate (own%steps(sub%n_grains), source=0)
+        own%left = sub%v_global(:, 1:sub%n_grains)
         do b = 1, sub%n_grains
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
           own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
@@ -231,8 +234,8 @@ contains
     end do
   end subroutine find_leaving
 
-  !> Bring steps at rest, and the momenta that wake, to the owners of the grains, in this subdomain by their places, in others by
-  !> records (owner, grain, steps, momentum). Collective.
+  !> Bring steps at rest, the momenta that wake and those left to the owners of the grains, in this subdomain by their places, in
+  !> others by records (owner, grain, steps, momentum, momenta left). Collective.
   subroutine bring_home(rule, problem, rest, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     type(contact_problem_t), intent(in) :: problem
@@ -241,7 +244,8 @@ contains
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer, allocatable :: destination(:)
     logical, allocatable :: sends(:)
-    integer :: s, b, k, r, h, place, n, round
+    real(dp) :: left(problem%kernels%nv)
+    integer :: s, b, k, r, h, place, n, round, d
 
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
@@ -258,7 +262,9 @@ contains
         associate (sub => problem%sub(s))
           call find_senders(problem, s, sends)
           do b = 1, sub%n_grains
-            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking(s, b))
+            left(:) = rest(s)%left(:, b)
+            call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), left)
+            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking(s, b), left)
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle
@@ -267,15 +273,21 @@ contains
             records(2, n) = sub%id(b)
             records(3, n) = rest(s)%steps(b)
             records(4, n) = transfer(waking(s, b), 0_i8)
+            do d = 1, size(left)
+              records(4 + d, n) = transfer(left(d), 0_i8)
+            end do
           end do
         end associate
       end do
-      if (round == 1) allocate (records(4, n), destination(n))
+      if (round == 1) allocate (records(4 + size(left), n), destination(n))
     end do
     call sparse_exchange(decomposition%comm, records, destination, received)
     do k = 1, size(received, 2)
       call decomposition%find_owned(received(1:2, k), h, place)
-      call put(h, place, narrow(received(3, k)), transfer(received(4, k), 0.0_dp))
+      do d = 1, size(left)
+        left(d) = transfer(received(4 + d, k), 0.0_dp)
+      end do
+      call put(h, place, narrow(received(3, k)), transfer(received(4, k), 0.0_dp), left)
     end do
     ! a cell that moves carries all grains along
     if (problem%cell%moves) return
@@ -292,13 +304,17 @@ contains
     end function waking
 
     !> Set what is known of grain `place` of subdomain `h` of this rank.
-    subroutine put(h, place, steps, momentum)
+    subroutine put(h, place, steps, momentum, left)
       integer, intent(in) :: h, place, steps
-      !> [N s]
-      real(dp), intent(in) :: momentum
+      !> that wakes it [N s]; all that is left to it (nv) [N s, N m s]
+      real(dp), intent(in) :: momentum, left(:)
 
-      decomposition%owned(h)%rest(place) = steps
-      if (steps >= rule%after) decomposition%owned(h)%wakes_at(place) = momentum
+      associate (owned => decomposition%owned(h))
+        owned%rest(place) = steps
+        if (steps < rule%after) return
+        owned%wakes_at(place) = momentum
+        owned%held(1:size(left), place) = -left
+      end associate
     end subroutine put
 
   end subroutine bring_home

@@ -13,10 +13,15 @@ module gravier_waking
   use gravier_body_mass, only: add_inverse_mass
   use gravier_pair_laws, only: boundary_of
   use gravier_borne_impulses, only: contacts_t, impulses_t, find_borne
-  use gravier_sleeping, only: may_push, momentum_of
+  use gravier_sleeping, only: sleeping_rule_t, may_push, momentum_of
   implicit none
   private
-  public :: resting_t, watch_awake, wake_disturbed, wake_left_behind, wake_all
+  public :: resting_t, watch_step, watch_awake, wake_disturbed, wake_left_behind, wake_all
+
+  !> momentum of a sleeping body, over that which wakes it, from which on its impulses count as changed
+  real(dp), parameter :: unnoticed = 1.0e-3_dp
+  !> numbers of steps at rest until a body sleeps, after which all are solved together if impulses on some have changed
+  integer, parameter :: rounds = 5
 
   !> What is left out of a problem.
   type :: resting_t
@@ -30,6 +35,19 @@ module gravier_waking
   end type marks_t
 
 contains
+
+  !> Find the pairs to look at in a new step, in views that are up to date. Collective.
+  subroutine watch_step(rule, step, decomposition, halo, resting)
+    type(sleeping_rule_t), intent(in) :: rule
+    !> that is to be made
+    integer, intent(in) :: step
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    type(resting_t), intent(out) :: resting
+
+    call rouse_stirred(rule, step, decomposition, halo)
+    call watch_awake(decomposition, halo, resting)
+  end subroutine watch_step
 
   !> Find the pairs to look at, in views that are up to date. What sleeps near boundaries that move wakes. Collective.
   subroutine watch_awake(decomposition, halo, resting)
@@ -159,6 +177,7 @@ contains
     !> impulses of the contacts that were solved
     type(impulses_t), intent(in) :: borne(:)
     logical, intent(out) :: woken
+    real(dp) :: momentum
     integer :: s, k
     logical :: touched
 
@@ -168,12 +187,14 @@ contains
         do k = 1, owned%n
           touched = any(abs(borne(s)%on(:, k)) > 0.0_dp)
           if (.not. owned%sleeps(k) .or. (owned%steady(k) .and. .not. touched)) cycle
-          if (momentum_under(owned, k, borne(s)%on(:, k)) > owned%wakes_at(k)) then
+          momentum = momentum_under(owned, k, borne(s)%on(:, k))
+          if (momentum > owned%wakes_at(k)) then
             call owned%wake(k)
             woken = .true.
           else
             ! what touches it now may be gone in the next step
             owned%steady(k) = .not. touched
+            if (momentum > unnoticed*owned%wakes_at(k)) owned%stirred(k) = 1
           end if
         end do
       end associate
@@ -279,6 +300,34 @@ contains
     end do
     call halo%refresh(decomposition)
   end subroutine wake_marked
+
+  !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: let all bodies be solved together in this step,
+  !> in views that are up to date. Changes that wake no single body then go on to all that bear them, and bodies that are still at
+  !> rest sleep on. Collective.
+  subroutine rouse_stirred(rule, step, decomposition, halo)
+    type(sleeping_rule_t), intent(in) :: rule
+    !> that is to be made
+    integer, intent(in) :: step
+    type(decomposition_t), intent(inout) :: decomposition
+    type(halo_t), intent(inout) :: halo
+    integer :: s, k
+    logical :: some
+
+    if (modulo(step, rule%after) /= 0 .or. modulo(step/rule%after, rounds) /= 0) return
+    some = .false.
+    do s = 1, size(decomposition%owned)
+      some = some .or. any(decomposition%owned(s)%stirred > 0)
+    end do
+    if (.not. decomposition%comm%any_true(some)) return
+    do s = 1, size(decomposition%owned)
+      associate (owned => decomposition%owned(s))
+        do k = 1, owned%n
+          if (owned%sleeps(k)) call owned%rouse(k)
+        end do
+      end associate
+    end do
+    call halo%refresh(decomposition)
+  end subroutine rouse_stirred
 
   !> Wake all bodies of this rank; views are to be brought up to date.
   pure subroutine wake_all(decomposition)

@@ -3,6 +3,7 @@
 program test_step_parts
   use mpi_f08, only: MPI_Barrier, MPI_COMM_WORLD
   use gravier_kinds, only: dp, i8
+  use gravier_narrow, only: narrow
   use gravier_errors, only: error_t
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
@@ -73,6 +74,7 @@ program test_step_parts
   call check_turned_sleeper(0.36_dp, 2)
   call check_swept_off()
   call check_held()
+  call check_stirred()
   call check_left_behind()
   call check_starting_boundary()
   call check_deep_contacts()
@@ -1011,6 +1013,39 @@ contains
     call check_close(held(sim, 1), 0.0_dp, 0.0_dp, "what is awake bears nothing of them")
     call sim%free()
   end subroutine check_held
+
+  !> What has changed the impulses on a sleeper without waking it is not forgotten: all are solved together in the step whose number
+  !> is the next multiple of five times `sleep_after`, and sleep on. Where nothing has changed they are not.
+  subroutine check_stirred()
+    type(simulation_t) :: sim
+    type(step_figures_t) :: figures
+    integer :: step
+
+    call make_chain(sim)
+    call push(sim, 3, -0.02_dp)
+    do step = 8, 40
+      call advance(sim, figures)
+      call check_equal(counted_stirred(sim), merge(1, 0, step < 20), "the middle disk has borne a change until all are solved")
+      if (step < 16) cycle
+      call check_equal(figures%asleep, merge(0_i8, 3_i8, step == 20), "in step 20 none sleeps")
+      call check_equal(sim%problem%n_contacts, merge(3_i8, 0_i8, step == 20), "and all contacts are solved")
+    end do
+    call sim%free()
+  end subroutine check_stirred
+
+  !> Grains, those of all ranks, that sleep under changed impulses.
+  integer function counted_stirred(sim)
+    type(simulation_t), intent(in) :: sim
+    integer(i8) :: n(1)
+    integer :: s
+
+    n(1) = 0
+    do s = 1, size(sim%decomposition%owned)
+      n(1) = n(1) + sum(sim%decomposition%owned(s)%stirred)
+    end do
+    call comm%sum_counts(n)
+    counted_stirred = narrow(n(1))
+  end function counted_stirred
 
   !> Vertical impulse that grain `id` bears of the contacts that are left out: the same on all ranks [N s].
   real(dp) function held(sim, id)

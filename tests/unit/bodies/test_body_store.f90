@@ -285,7 +285,8 @@ contains
     layout = body_layout_t(sizes(1), sizes(2), sizes(3))
     call others%init(layout, 2)
     call check(.not. others%sleeps(1), "where none may sleep none does")
-    call check_equal(size(others%rest) + size(others%wakes_at) + size(others%held), 0, "and nothing is kept for it")
+    call check_equal(size(others%rest) + size(others%wakes_at) + size(others%held) + size(others%stirred), 0, &
+      & "and nothing is kept for it")
     layout%nr = 1
     call bodies%init(layout, 2)
     call check_equal(layout%saved_words(), others%saved_words() + layout%rest_words(), "words of the rest in a checkpoint")
@@ -305,6 +306,7 @@ contains
     call check(.not. bodies%sleeps(2), "a body that has rested for some steps is awake")
     bodies%wakes_at(2) = 0.25_dp
     bodies%held(:, 2) = 0.5_dp
+    bodies%stirred(2) = 1
     allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
     call bodies%get_record(2, record)
     first = layout%saved_words() - layout%rest_words() + 1
@@ -314,6 +316,11 @@ contains
     call check(others%sleeps(1) .and. others%rest(1) == 7, "a body that travels sleeps on")
     call check(size(others%held, 1) == sizes(2) .and. all(abs(others%held(:, 1) - 0.5_dp) < 1.0e-15_dp), &
       & "and bears what it has borne")
+    call check_equal(others%stirred(1), 1, "it is known that this has changed")
+    call others%rouse(1)
+    call check(.not. others%sleeps(1) .and. others%rest(1) == 7 .and. others%stirred(1) == 0, &
+      & "a body that is roused has rested as long")
+    call others%set_record(1, record)
     call bodies%get_renewed(2, renewed)
     call others%set_renewed(2, renewed)
     call check(others%sleeps(2), "its copies know of it")
@@ -348,7 +355,7 @@ contains
       call bodies%describe_field(f, name, bytes, entries)
       if (len(name) == 0) exit
       call check_equal(bytes, merge(4, 8, name == "glued" .or. name == "material" .or. name == "image" .or. name == "shape" .or. &
-        & name == "rest"), &
+        & name == "rest" .or. name == "stirred"), &
         & "bytes of "//name)
       names = names//name//" "
       words = words + entries
