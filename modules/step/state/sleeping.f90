@@ -44,7 +44,7 @@ module gravier_sleeping
     logical, allocatable :: rests(:)
     !> steps at rest, with this one (n_grains); places in the view (n_columns)
     integer, allocatable :: steps(:), seen(:)
-    !> velocities that the step leaves to those that come to stand still (nv, n_grains) [m/s, rad/s]
+    !> momenta that the step leaves to the grains (nv, n_grains) [N s, N m s]
     real(dp), allocatable :: left(:, :)
   end type rest_t
 
@@ -96,6 +96,7 @@ contains
         allocate (own%steps(sub%n_grains), source=0)
         own%left = sub%v_global(:, 1:sub%n_grains)
         do b = 1, sub%n_grains
+          call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), own%left(:, b))
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
           own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
           if (stops .and. 2*own%steps(b) >= rule%after) sub%v_global(:, b) = 0.0_dp
@@ -262,9 +263,7 @@ contains
         associate (sub => problem%sub(s))
           call find_senders(problem, s, sends)
           do b = 1, sub%n_grains
-            left(:) = rest(s)%left(:, b)
-            call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), left)
-            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking(s, b), left)
+            if (round == 1 .and. sub%place(b) > 0) call put(s, sub%place(b), rest(s)%steps(b), waking(s, b), rest(s)%left(:, b))
             if (.not. sends(b)) cycle
             n = n + 1
             if (round == 1) cycle
@@ -274,7 +273,7 @@ contains
             records(3, n) = rest(s)%steps(b)
             records(4, n) = transfer(waking(s, b), 0_i8)
             do d = 1, size(left)
-              records(4 + d, n) = transfer(left(d), 0_i8)
+              records(4 + d, n) = transfer(rest(s)%left(d, b), 0_i8)
             end do
           end do
         end associate
