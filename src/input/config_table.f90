@@ -165,15 +165,17 @@ module gravier_config_table
            "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &
            count=3, planar=1, unit="rad/s"), &
      key_t("boundary", "oscillation", kind_real, "3*0", "", &
-           "amplitude of a displacement by sin(2 pi `frequency` t + `phase`), beside the other motion; 0 where a component is "// &
-           "`free`, and its third component in 2D", &
+           "amplitude A of an oscillation beside the other motion: at time t it has displaced the boundary from its place at "// &
+           "time 0 by A [sin(2 pi `frequency` t + `phase`) - sin(`phase`)]; 0 where a component is `free`, and its third "// &
+           "component in 2D", &
            count=3, unit="m"), &
      key_t("boundary", "rotation_oscillation", kind_real, "3*0", "", &
            "amplitude of a rotation in the same manner: one entry in 2D, three in 3D; 0 where a component is `free`", &
            count=3, planar=1, unit="rad"), &
      key_t("boundary", "frequency", kind_real, "0", "", "periods of the oscillation in a second, > 0; 0 without one", &
            unit="Hz", note="required with an oscillation"), &
-     key_t("boundary", "phase", kind_real, "0", "", "angle of the oscillation at time 0; 0 without one", unit="rad"), &
+     key_t("boundary", "phase", kind_real, "0", "", &
+           "angle of the oscillation at time 0: with -1.5708 it starts from rest; 0 without one", unit="rad"), &
      key_t("boundary", "pivot", kind_real, "3*0", "", "the point it turns about", &
            count=3, unit="m", note="the value of `point`; for glued grains the origin"), &
      key_t("boundary", "free", kind_logical, "3*.false.", "", &
