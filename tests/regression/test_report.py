@@ -224,6 +224,11 @@ class Report(RunTestCase):
                 "good": "", "doubt": f"{depth} of the mean radius. Half of the step shows whether the results depend on it.",
                 "bad": f"{depth} of the mean radius. Take a smaller step."}[grade])
 
+    def test_axes_of_places(self):
+        """Curves of places fit their panel, wherever 0 is; those of forces do not."""
+        table = gravier.results.Table({"time": np.arange(4.0), "force_y:lid": np.arange(1.0, 5.0), "position_y:lid": np.array([0.3, 0.2, 0.1, 0.01])})
+        self.assertEqual([(panel.label, panel.places) for panel in figures.boundary_panels(table)], [("force along y [N]", False), ("position along y [m]", True)])
+
     def test_steps_above_the_goal(self):
         """One step that missed its goal is one step, not steps; what missed something else is said beside it."""
         for above, missed, words in ((2, 2, "It was above this goal in 2 steps."), (1, 1, "It was above this goal in 1 step."),
