@@ -184,8 +184,8 @@ module gravier_config_table
      key_t("boundary", "force", kind_real, "3*0", "", "force on the free components, 0 on the others", &
            count=3, unit="N", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "pressure", kind_real, "0", "", &
-           "pressure along `normal`, which lies along an axis with a free component; the area is the distance of two planes "// &
-           "that face each other along each other axis and stay, or the period", &
+           "pressure along `normal`, which lies along an axis with a free component. Its area has a side along each other "// &
+           "axis: the period, or the distance of two planes that face each other along that axis and are not removed", &
            unit="Pa, N/m in 2D", chooser="shape", chosen="plane "//wall_of_bodies), &
      key_t("boundary", "mass", kind_real, "0", "> 0", "inertia of a boundary that has free components; only there", &
            unit="kg", note="required where a component is `free`", chooser="shape", chosen=solid_shapes), &
