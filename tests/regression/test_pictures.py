@@ -310,6 +310,24 @@ class Pictures(RunTestCase):
             self.assert_apart(box, (*(centre - radius), *(centre + radius)), "a number and a sphere")
         plt.close(figure)
 
+    def test_rectangles_among_bodies(self):
+        """Bodies hide the pieces of the outline of a rectangle that lie behind them, and none that lie before them or beside them; transparent ones
+        hide nothing. A body with a shape hides what its faces cover, not what the sphere around it covers."""
+        square = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+        walls = SimpleNamespace(planes=lambda: (np.zeros((0, 3)), np.zeros((0, 3))), polygons=lambda: [square], cylinders=lambda: [], facets=np.zeros((0, 3, 3)))
+        view, corners = picture_space.View(3, 0.0, 90.0), np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)])
+        box = [corners[[0, 1, 3, 2]], corners[[4, 6, 7, 5]], corners[[0, 4, 5, 1]], corners[[2, 3, 7, 6]], corners[[0, 2, 6, 4]], corners[[1, 5, 7, 3]]]
+        for height, shaped, reach in ((0.5, False, 0.5), (-0.6, False, 0.0), (0.5, True, 0.2), (-0.3, True, 0.0), (0.5, None, 0.0)):
+            bodies = gravier.Table({"position": np.array([[1.0, 0.0, height]]), "radius": np.array([0.5])})
+            figure, axes = plt.subplots()
+            found = [[face + bodies.position[0] for face in box]] if shaped else None
+            picture_space.draw_space(axes, view, walls, np.array([-2.0, -2.0, -3.0]), np.array([2.0, 2.0, 1.0]), None if shaped is None else bodies, found)
+            pieces = np.concatenate([collection.get_segments() for collection in axes.collections] or [np.zeros((0, 2, 2))]).reshape(-1, 2, 2)
+            drawn = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum()
+            self.assertAlmostEqual(drawn, 0.0 if shaped is None else 8.0 - 2.0 * reach, delta=0.07, msg=f"{height} {shaped}")
+            self.assertEqual(len([patch for patch in axes.patches if len(patch.get_xy()) == 5 and np.ptp(patch.get_xy()) == 2.0]), 1 if shaped is None else 0)
+            plt.close(figure)
+
     def test_planes_within_the_box(self):
         """A plane along the axes that is no face of the box is drawn: filled behind its bodies, an outline before them."""
         rows = gravier.Table({"shape": np.array(["plane"] * 4), "position": np.array([[0.5, 0.0, 0.0], [0.7, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
