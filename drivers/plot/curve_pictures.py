@@ -17,9 +17,13 @@ STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
-         (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"position_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
-         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|.*velocity_[xyz]", "m/s"),
+         (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
+         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
          (r"gravity_[xyz]", "m/s²")]
+#: columns of places: their origin says nothing, so that their axes need not begin there
+PLACES = re.compile(r"(position|body)_[xyz]:")
+#: an axis begins at 0 where the least value is below this part of the largest one; a range below this part of the values has a base of its own
+NEAR, NARROW = 0.2, 1e-3
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
 
 
@@ -60,35 +64,51 @@ def names_of(runs):
     return ["/".join(path[first:len(path) - last + 1]) for path in parts]
 
 
-def limits_of(values, logarithms=True):
+def limits_of(values, logarithms=True, places=False):
     """Scale and limits of an axis on which the values are seen: logarithms where the largest is far above a quarter of them, but no more
-    than three decades for the least twentieth; from 0 where that is near."""
+    than three decades for the least twentieth; from 0 where that is near. The axis of places fits them, wherever 0 is."""
     values = values[numpy.isfinite(values)]
     positive = values[values > 0.0]
     if len(values) == 0:
         return "linear", 0.0, 1.0
     low, high = values.min(), values.max()
-    if logarithms and low >= 0.0 and 2 * len(positive) > len(values):
+    if logarithms and not places and low >= 0.0 and 2 * len(positive) > len(values):
         if high > 30.0 * numpy.quantile(positive, 0.25):
             return "log", max(positive.min(), 1e-3 * numpy.quantile(positive, 0.05)) / 1.5, 1.5 * high
-    if 0.0 <= low < 0.5 * high:
+    if not places and 0.0 <= low < NEAR * high:
         return "linear", 0.0, 1.05 * high
-    if 0.5 * low < high <= 0.0:
+    if not places and NEAR * low < high <= 0.0:
         return "linear", 1.05 * low, 0.0
-    margin = 0.05 * (high - low) or 0.05 * abs(high) or 0.5
+    top = max(abs(low), abs(high))
+    # what differs by rounding alone is constant
+    margin = 0.05 * (high - low) if high - low > 1e-12 * top else 0.05 * top or 0.5
     return "linear", low - margin, high + margin
 
 
-def fit_axis(axis, values, label, logarithms=True):
-    """Scale, limits and label of an axis for these values; a power of ten stands in the label, beside the unit, not over the panel."""
+def base_of(low, high):
+    """What all numbers of an axis would begin with, and its text: a multiple of a power of ten above the range, where that is narrow."""
+    if high - low >= NARROW * max(abs(low), abs(high)):
+        return 0.0, ""
+    digits = -int(numpy.ceil(numpy.log10(high - low)))
+    base = float(numpy.floor(low * 10.0**digits) / 10.0**digits)
+    return base, f"{'−' if base > 0.0 else '+'} {abs(base):.{max(0, digits)}f}"
+
+
+def fit_axis(axis, values, label, logarithms=True, places=False):
+    """Scale, limits and label of an axis for these values. A power of ten stands in the label, beside the unit, not over the panel; what all
+    numbers begin with stands in a second line of the label."""
     name = axis.axis_name
-    scale, low, high = limits_of(values, logarithms)
+    scale, low, high = limits_of(values, logarithms, places)
     axis.axes.set(**{f"{name}scale": scale, f"{name}lim": (low, high)})
-    top = max(abs(low), abs(high))
-    if scale == "linear" and not 1e-2 <= top < 1e4:
-        power, unit = scaled(top, "")
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**power:.10g}"))
-        label = label.replace(" [", f" [{unit}", 1) if " [" in label else f"{label} [{unit.strip()}]"
+    base, text = base_of(low, high) if scale == "linear" else (0.0, "")
+    top = max(abs(low - base), abs(high - base))
+    if scale == "linear" and (text or not 1e-2 <= top < 1e4):
+        power, ten = (0, "") if 1e-2 <= top < 1e4 else scaled(top, "")
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{(value - base) / 10.0**power:.6g}"))
+        words, _, unit = label.partition(" [")
+        if text:
+            words += f"\n{text} {unit.removesuffix(']')}".rstrip()
+        label = f"{words} [{(ten + unit.removesuffix(']')).strip()}]" if ten or unit else words
     axis.set_label_text(label)
 
 
@@ -107,14 +127,14 @@ def grid(axes):
 
 class Panel:
     """Curves over one axis: `label` of the vertical axis, `curves` (x, y, name or None), `goals` (value, name); never with logarithms
-    where `counts`."""
+    where `counts`; `places` fit the panel, wherever 0 is."""
 
-    def __init__(self, label, curves, goals=(), counts=False):
-        self.label, self.curves, self.goals, self.counts = label, curves, list(goals), counts
+    def __init__(self, label, curves, goals=(), counts=False, places=False):
+        self.label, self.curves, self.goals, self.counts, self.places = label, curves, list(goals), counts, places
 
     def draw(self, axes, colours=LINES):
         values = numpy.concatenate([numpy.asarray(y, float) for _, y, _ in self.curves] + [[value] for value, _ in self.goals])
-        scale, low, _ = limits_of(values, not self.counts)
+        scale, low, _ = limits_of(values, not self.counts, self.places)
         for k, (x, y, name) in enumerate(self.curves):
             if scale == "log" and name and not (numpy.asarray(y) > 0.0).any():
                 name += ": 0"
@@ -123,7 +143,7 @@ class Panel:
         for value, name in self.goals:
             axes.axhline(value, color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=name)
         grid(axes)
-        fit_axis(axes.yaxis, values, self.label, not self.counts)
+        fit_axis(axes.yaxis, values, self.label, not self.counts, self.places)
         positive = values[numpy.isfinite(values) & (values > 0.0)]
         if scale == "log" and positive.min() < low:
             axes.text(0.995, 0.03, f"values go down to {positive.min():.1g}", transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="0.35")
@@ -155,7 +175,8 @@ def draw_history(runs, columns, against="time", rows=1):
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
     panels = [Panel(label_of_all(column, dimensions), [(history[against], history[column], name if k == 0 else None)
-                                                       for name, history in zip(names, histories)], counts=column == "iterations")
+                                                       for name, history in zip(names, histories)],
+                    counts=column == "iterations", places=bool(PLACES.match(column)))
               for k, column in enumerate(columns)]
     return draw_panels(panels, along=label_of_all(against, dimensions))
 
@@ -249,16 +270,33 @@ def components(rows, column, dimension, axis):
     return {"".join("xyz"[a] for a in part): values[(slice(None), *part)] for part in shown}
 
 
+def steps_of_profile(run, asked):
+    """The written steps that are asked for, in their order: `all`, or numbers, None for the last one, and pairs (first, last) for those from
+    one step to another, whose ends are None where the run has its own. There are no means at the start."""
+    written = [step for step in run.steps if step > 0]
+    if not written:
+        raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
+    chosen = set(written if asked == "all" else [])
+    for part in [] if asked == "all" else asked:
+        if not isinstance(part, tuple):
+            chosen.add(run.find_step(part))
+            continue
+        first, last = part[0] or 0, written[-1] if part[1] is None else part[1]
+        among = [step for step in written if first <= step <= last]
+        if not among:
+            raise PictureError(f"{run.path}: no written step from {first} to {last}; expected some of {written[0]} to {written[-1]}")
+        chosen.update(among)
+    return sorted(chosen)
+
+
 def draw_profile(run, name, steps, columns, mean):
-    """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. Without
-    steps these are the last one or, with `mean`, all written ones. A position along the height of the scene is drawn upwards."""
+    """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. Steps are
+    as in steps_of_profile, by default the last one or, with `mean`, all written ones. A position along the height is drawn upwards."""
     known = [*PROFILES, *parts_of(run.dimension)]
     for column in columns:
         if column not in known:
             raise PictureError(f"no column {column} of a profile; expected one of {', '.join(known)}")
-    steps = [step for step in run.steps if step > 0] if steps == "all" or mean and not steps else sorted({run.find_step(step) for step in steps or [None]})
-    if not steps:
-        raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
+    steps = steps_of_profile(run, "all" if mean and not steps else steps or [None])
     name, axis = region_with_bins(run, name, steps[-1])
     tables = [run.region_mean(name, steps)] if mean else [run.region(name, step) for step in steps]
     several = any(len(components(tables[0], column, run.dimension, axis)) > 1 for column in columns)

@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
-from one_line import OneLineParser, run_tool
+from one_line import OneLineParser, plain, run_tool
 from packing_picture import COLOURS, draw_packing
 from picture_style import PictureError
 from whole_file import PICTURES, claim, save_figure
@@ -43,8 +43,13 @@ def save(figure, path, dpi=200):
 
 
 def steps_of(text):
-    """`all`, or numbers of steps with commas between."""
-    return "all" if text == "all" else [int(number) for number in text.split(",")]
+    """`all`, or numbers of steps and ranges FIRST:LAST with commas between, as steps_of_profile takes them; an end may be left out."""
+    if text == "all":
+        return text
+    parts = text.split(",")
+    if not all(re.fullmatch(r"\d+|\d*:\d*", part) for part in parts):
+        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected all, or steps and ranges of them such as 100,5000:8000")
+    return [tuple(int(end) if end else None for end in part.split(":")) if ":" in part else int(part) for part in parts]
 
 
 def parse(arguments):
@@ -77,7 +82,8 @@ def parse(arguments):
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")
     profile.add_argument("--region", metavar="NAME", help="a region with bins; the only one unless told")
-    profile.add_argument("--steps", type=steps_of, metavar="N,N", help="written steps, or all; unless told the last one, and with --mean all")
+    profile.add_argument("--steps", type=steps_of, metavar="N,N:M", help="written steps and ranges of them as 5000:8000 or 5000:, ends included, or all; "
+                         "unless told the last one, and with --mean all")
     profile.add_argument("--mean", action="store_true", help="the mean over the steps in the place of a line a step; velocities are weighted by the volume of grains")
     profile.add_argument("--columns", default="solid_fraction,velocity,stress", metavar="A,B", help="%(default)s unless told")
     # numbers as -1e-3 are no options

@@ -7,7 +7,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.ticker import MaxNLocator
 from palette import CHAINS, PLAIN, PULLS
 from picture_regions import draw_regions, region_corners
-from picture_space import View, Walls, box_around, chosen, draw_flat_walls, draw_space, frame_around
+from picture_space import View, Walls, box_around, chosen, draw_flat_walls, draw_space, frame_around, newell
 from picture_style import SPEEDS, TURNS, PictureError, colours_of_kinds, scaled
 
 import gravier
@@ -124,11 +124,6 @@ def add_legend(figure, axes, values, label, how, names=None):
 def shaped(bodies):
     """Whether some body is neither a disk nor a sphere."""
     return "shape" in bodies and "orientation" in bodies and bool(numpy.any(bodies.shape > 0))
-
-
-def newell(points):
-    """Normal of a polygon in space, as long as twice its area."""
-    return numpy.cross(points, numpy.roll(points, -1, axis=0)).sum(axis=0)
 
 
 def visible_polygons(outlines, view, order):
@@ -293,7 +288,7 @@ def draw_packing(run, step, options, frame=None):
         # as many numbers as have room
         axes.xaxis.set_major_locator(MaxNLocator(nbins=max(1, min(8, round(2.0 * options.size * size[0])))))
     else:
-        draw_space(axes, view, walls, *box)
+        draw_space(axes, view, walls, *box, bodies=drawn if through == 1.0 else None, outlines=outlines)
         axes.set_axis_off()
     if options.regions:
         draw_regions(axes, run, step, view, *box_around(bodies, walls))

@@ -2,6 +2,7 @@
 import matplotlib.pyplot as plt
 import numpy
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from picture_style import WALLS
 
@@ -16,6 +17,8 @@ ALONG = 0.999
 #: a frame leaves grains out only if there are so many of them; the part of them that lies beyond the percentiles on each side; a frame leaves grains
 #: out only if they would make it so many times as large
 MANY, OUTERMOST, TOO_LARGE = 100, 0.005, 3.0
+#: pieces of an edge of a rectangle, which bodies hide one by one
+PIECES = 60
 
 
 class View:
@@ -168,13 +171,46 @@ def draw_flat_walls(axes, walls, low, high):
 
 # ---- in space
 
-def draw_space(axes, view, walls, low, high):
+def newell(points):
+    """Normal of a polygon in space, as long as twice its area."""
+    return numpy.cross(points, numpy.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def hidden(points, view, bodies, outlines):
+    """Which points (n) are behind a body: behind the surface of a sphere, or a face of a body with `outlines` that faces the eye."""
+    place, depth = view.place(points), points @ view.eye
+    centres, depths = view.place(bodies.position), bodies.position @ view.eye
+    found = numpy.zeros(len(points), dtype=bool)
+    for k, at in enumerate(place):
+        rest = bodies.radius**2 - ((centres - at)**2).sum(axis=1)
+        near = numpy.flatnonzero((rest > 0.0) & (depths + numpy.sqrt(numpy.maximum(rest, 0.0)) > depth[k]))
+        if outlines is None:
+            found[k] = len(near) > 0
+            continue
+        faces = (face for body in near for face in outlines[body] if numpy.dot(newell(face), view.eye) > 0.0)
+        found[k] = any(numpy.mean(face @ view.eye) > depth[k] and Path(view.place(face)).contains_point(at) for face in faces)
+    return found
+
+
+def draw_outline(axes, view, points, bodies, outlines):
+    """The edges of a rectangle among the bodies, but for what these hide."""
+    ends = points[:, None] + numpy.linspace(0.0, 1.0, PIECES + 1)[:, None] * (numpy.roll(points, -1, axis=0) - points)[:, None]
+    pieces = numpy.stack([ends[:, :-1], ends[:, 1:]], axis=2).reshape(-1, 2, 3)
+    seen = ~hidden(pieces.mean(axis=1), view, bodies, outlines)
+    axes.add_collection(LineCollection(view.place(pieces[seen]), colors="0.35", linewidths=0.8, zorder=3.0))
+
+
+def draw_space(axes, view, walls, low, high, bodies=None, outlines=None):
     """The box around a scene in 3D with numbers along three of its edges, and the walls: what is behind the bodies is filled, what is in
-    front of them is an outline."""
+    front of them is an outline. Where `bodies` are told, which are not transparent, they hide parts of the outlines of rectangles."""
     draw_box(axes, view, walls, low, high)
     middle = 0.5 * (low + high)
     for points in walls.polygons():
-        draw_wall(axes, view, points, numpy.dot(points.mean(axis=0) - middle, view.eye) > 0.0)
+        before = numpy.dot(points.mean(axis=0) - middle, view.eye) > 0.0
+        if before and bodies is not None:
+            draw_outline(axes, view, points, bodies, outlines)
+        else:
+            draw_wall(axes, view, points, before)
     for point, normal in zip(*walls.planes()):
         if not is_face(point, normal, low, high):
             points = cut_box(point, normal, low, high)

@@ -39,9 +39,9 @@ def thinned(x, y):
     return x[chosen], y[chosen]
 
 
-def panel(history, label, columns, goals=(), counts=False):
+def panel(history, label, columns, goals=(), counts=False, places=False):
     """A panel of columns, (name of the curve or None, values) each."""
-    return Panel(label, [(*thinned(history.time, values), name) for name, values in columns[:MOST_CURVES]], goals, counts)
+    return Panel(label, [(*thinned(history.time, values), name) for name, values in columns[:MOST_CURVES]], goals, counts, places)
 
 
 # ---- curves
@@ -98,7 +98,7 @@ def boundary_panels(history):
             columns = [(name.split(":", 1)[1], history[name]) for name in history if name.startswith(f"{kind}_{axis}:")]
             columns = [(name, values) for name, values in columns if (numpy.ptp(values) if kind == "position" else numpy.abs(values).max()) > 0.0]
             if columns:
-                panels.append(panel(history, f"{kind} along {axis} [{unit}]", columns))
+                panels.append(panel(history, f"{kind} along {axis} [{unit}]", columns, places=kind == "position"))
     return panels
 
 

@@ -32,9 +32,14 @@ def percent(share):
     return "none" if share == 0.0 else "less than 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
 
 
+def counted(number_of, word):
+    """A number with its word: 1 step, 2 steps."""
+    return f"{number_of} {word}" if number_of == 1 else f"{number_of} {word}s"
+
+
 def ended(log, history, steps):
     made = int(history.step[-1]) if len(history) > 0 else log.last_step(steps)
-    made = f"{'?' if made is None else made} of {'?' if steps is None else steps} steps"
+    made = f"{'?' if made is None else made} of {'? steps' if steps is None else counted(steps, 'step')}"
     word, text = log.end()
     early = next((f"{begin} {log.value(begin)}" for begin in ("at rest", "ended") if log.value(begin)), None)
     if word == "finished":
@@ -53,8 +58,8 @@ def converged(log, history):
         return Answer(question, UNKNOWN, "Not known: no solve is recorded.")
     missed = int((history.converged == 0).sum())
     if missed > 0:
-        return Answer(question, BAD, f"No: {missed} of {len(history)} solves so far did not.")
-    return Answer(question, GOOD, f"Yes, all {len(history)} solves so far.")
+        return Answer(question, BAD, f"No: {missed} of {counted(len(history), 'solve')} so far did not.")
+    return Answer(question, GOOD, "Yes, the only solve so far." if len(history) == 1 else f"Yes, all {len(history)} solves so far.")
 
 
 def accurate(log, history, solver):
@@ -78,7 +83,7 @@ def accurate(log, history, solver):
         if "converged" in history and (history.converged == 0).any():
             missed, above = int((history.converged == 0).sum()), int((ratio[history.converged == 0] > goal).sum())
             beside = "" if above == missed else f", and in {missed - above} more what else the criterion asks for was missed"
-            return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}; it was above it in {above} steps{beside}.")
+            return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}. It was above this goal in {counted(above, 'step')}{beside}.")
         if log.value("drift"):
             return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}, with a goal of {goal:g}; {log.value('drift')}.")
         return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}, with a goal of {goal:g}.")
@@ -128,7 +133,7 @@ def how_often_projected(log, history):
     if (before > 0).any():
         grade = BAD if grade == BAD else DOUBT
         part = percent(float((before > 0).mean()))
-        words.append(f"projected in {part} of the steps" if known == 0 else f"before the restart, projected in {part} of {len(before)} steps")
+        words.append(f"projected in {part} of the steps" if known == 0 else f"before the restart, projected in {part} of {counted(len(before), 'step')}")
     if not words:
         return Answer(question, GOOD, f"No step projected overlaps. {overlap}")
     often = share > OFTEN or (len(before) > 0 and float((before > 0).mean()) > OFTEN)
@@ -145,8 +150,8 @@ def too_fast(history):
     """Whether something went too far in a step to be seen by what it passed."""
     if "fast" not in history or not (history.fast > 0).any():
         return []
-    times, steps = int(history.fast.sum()), int((history.fast > 0).sum())
-    return [Answer("Was the step short enough?", DOUBT, f"Not always: {times} times something moved by more than half of its thickness in a step, in {steps} steps. "
+    times, steps = counted(int(history.fast.sum()), "time"), counted(int((history.fast > 0).sum()), "step")
+    return [Answer("Was the step short enough?", DOUBT, f"Not always: {times} something moved by more than half of its thickness in a step, in {steps}. "
                    "It may have passed through others.")]
 
 

@@ -165,15 +165,17 @@ module gravier_config_table
            "prescribed rate of rotation: one entry in 2D, about the third axis; three in 3D; 0 where a component is `free`", &
            count=3, planar=1, unit="rad/s"), &
      key_t("boundary", "oscillation", kind_real, "3*0", "", &
-           "amplitude of a displacement by sin(2 pi `frequency` t + `phase`), beside the other motion; 0 where a component is "// &
-           "`free`, and its third component in 2D", &
+           "amplitude A of an oscillation beside the other motion: at time t it has displaced the boundary from its place at "// &
+           "time 0 by A [sin(2 pi `frequency` t + `phase`) - sin(`phase`)]; 0 where a component is `free`, and its third "// &
+           "component in 2D", &
            count=3, unit="m"), &
      key_t("boundary", "rotation_oscillation", kind_real, "3*0", "", &
            "amplitude of a rotation in the same manner: one entry in 2D, three in 3D; 0 where a component is `free`", &
            count=3, planar=1, unit="rad"), &
      key_t("boundary", "frequency", kind_real, "0", "", "periods of the oscillation in a second, > 0; 0 without one", &
            unit="Hz", note="required with an oscillation"), &
-     key_t("boundary", "phase", kind_real, "0", "", "angle of the oscillation at time 0; 0 without one", unit="rad"), &
+     key_t("boundary", "phase", kind_real, "0", "", &
+           "angle of the oscillation at time 0: with -1.5708 it starts from rest; 0 without one", unit="rad"), &
      key_t("boundary", "pivot", kind_real, "3*0", "", "the point it turns about", &
            count=3, unit="m", note="the value of `point`; for glued grains the origin"), &
      key_t("boundary", "free", kind_logical, "3*.false.", "", &
@@ -182,8 +184,8 @@ module gravier_config_table
      key_t("boundary", "force", kind_real, "3*0", "", "force on the free components, 0 on the others", &
            count=3, unit="N", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "pressure", kind_real, "0", "", &
-           "pressure along `normal`, which lies along an axis with a free component; the area is the distance of two planes "// &
-           "that face each other along each other axis and stay, or the period", &
+           "pressure along `normal`, which lies along an axis with a free component. Its area has a side along each other "// &
+           "axis: the period, or the distance of two planes that face each other along that axis and are not removed", &
            unit="Pa, N/m in 2D", chooser="shape", chosen="plane "//wall_of_bodies), &
      key_t("boundary", "mass", kind_real, "0", "> 0", "inertia of a boundary that has free components; only there", &
            unit="kg", note="required where a component is `free`", chooser="shape", chosen=solid_shapes), &

@@ -133,6 +133,14 @@ class Jobs(RunTestCase):
         for name, made in (("grade_1.h5", True), ("grade_2.h5", True), ("grade_3.h5", False)):
             self.assertEqual(os.path.exists(os.path.join(self.work, name)), made, name)
         self.assertIn("grade_3: the run ended with status 2, see grade_3.out: gravier_sample: error: ", done.stderr)
+        # a sample has no directory of results; a run has one
+        write(os.path.join(self.work, "same.csv"), "count\n20\n30\n")
+        write(os.path.join(self.work, "same.nml"), "&scene bodies = 'sample' /\n&sample count = @count@, box = 0.2, radius = 0.01, file = 'same.h5' /\n"
+              "&time step = 1.0e-3, steps = 0 /\n")
+        for program, place in (("gravier_sample", 'file = "@run@.h5" in &sample, a bodies file for each row'),
+                               ("gravier", '&output directory = "@run@", a directory for each row')):
+            done = self.sh("gravier_job", "--list", "same.csv", "same.nml", GRAVIER_PROGRAM=program)
+            self.assertEqual((done.returncode, done.stderr), (2, f"gravier_job: error: same.nml: no @run@; expected {place}\n"))
 
     def test_without_a_scheduler_it_goes_on_by_itself(self):
         write(os.path.join(self.work, "case.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 80}}))

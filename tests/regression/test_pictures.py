@@ -84,46 +84,6 @@ class Colours(unittest.TestCase):
         self.assertEqual(found[16:], found[:4])
 
 
-class Axes(unittest.TestCase):
-
-    def test_limits(self):
-        flat = np.full(50, 3.0)
-        for values, scale, low, high in ((np.linspace(0.0, 2.0, 11), "linear", 0.0, 2.1), (np.linspace(10.0, 11.0, 11), "linear", 9.95, 11.05),
-                                         (flat, "linear", 2.85, 3.15), (np.zeros(3), "linear", -0.5, 0.5),
-                                         (np.linspace(-2.0, 0.0, 5), "linear", -2.1, 0.0), (np.array([np.nan]), "linear", 0.0, 1.0),
-                                         (np.geomspace(1e-4, 1.0, 41), "log", 1e-4 / 1.5, 1.5)):
-            found = curve_pictures.limits_of(values)
-            self.assertEqual(found[0], scale)
-            np.testing.assert_allclose(found[1:], (low, high), rtol=1e-12)
-        # a few small values do not make logarithms, and on logarithms they do not take the space of the others
-        self.assertEqual(curve_pictures.limits_of(np.append(flat, [1e-12, 1e-9]))[0], "linear")
-        scale, low, _ = curve_pictures.limits_of(np.append(np.geomspace(1e-3, 1.0, 99), 1e-30))
-        self.assertEqual(scale, "log")
-        self.assertGreater(low, 1e-7)
-        self.assertEqual(curve_pictures.limits_of(np.geomspace(1e-4, 1.0, 41), logarithms=False)[:2], ("linear", 0.0))
-
-    def test_labels(self):
-        for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
-                                       ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
-                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
-                                       ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
-                                       ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
-                                       ("force_x:hard_work", 2, "force x:hard work [N]")):
-            self.assertEqual(curve_pictures.label_of(name, dimension), label)
-        for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):
-            self.assertEqual(curve_pictures.label_of_all(name, [3, 2, 3]), label)
-        figure, axes = plt.subplots()
-        curve_pictures.Panel("energy [J]", [(np.arange(99), np.geomspace(1e-3, 1.0, 99), "a"), (np.arange(99), np.zeros(99), "b"),
-                                            (np.arange(2), np.array([1.0, 1e-30]), "c")]).draw(axes)
-        self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["a", "b: 0", "c"])
-        self.assertEqual([text.get_text() for text in axes.texts], ["values go down to 1e-30"])
-        plt.close(figure)
-        figure, axes = plt.subplots()
-        curve_pictures.fit_axis(axes.yaxis, np.array([0.0, 25000.0]), "pressure [Pa]")
-        self.assertEqual((axes.get_ylabel(), axes.yaxis.get_major_formatter()(20000.0, 0)), ("pressure [$10^{3}$ Pa]", "20"))
-        plt.close(figure)
-
-
 class Pictures(RunTestCase):
 
     @classmethod
@@ -350,6 +310,24 @@ class Pictures(RunTestCase):
             self.assert_apart(box, (*(centre - radius), *(centre + radius)), "a number and a sphere")
         plt.close(figure)
 
+    def test_rectangles_among_bodies(self):
+        """Bodies hide the pieces of the outline of a rectangle that lie behind them, and none that lie before them or beside them; transparent ones
+        hide nothing. A body with a shape hides what its faces cover, not what the sphere around it covers."""
+        square = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+        walls = SimpleNamespace(planes=lambda: (np.zeros((0, 3)), np.zeros((0, 3))), polygons=lambda: [square], cylinders=lambda: [], facets=np.zeros((0, 3, 3)))
+        view, corners = picture_space.View(3, 0.0, 90.0), np.array([[x, y, z] for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.2, 0.2)])
+        box = [corners[[0, 1, 3, 2]], corners[[4, 6, 7, 5]], corners[[0, 4, 5, 1]], corners[[2, 3, 7, 6]], corners[[0, 2, 6, 4]], corners[[1, 5, 7, 3]]]
+        for height, shaped, reach in ((0.5, False, 0.5), (-0.6, False, 0.0), (0.5, True, 0.2), (-0.3, True, 0.0), (0.5, None, 0.0)):
+            bodies = gravier.Table({"position": np.array([[1.0, 0.0, height]]), "radius": np.array([0.5])})
+            figure, axes = plt.subplots()
+            found = [[face + bodies.position[0] for face in box]] if shaped else None
+            picture_space.draw_space(axes, view, walls, np.array([-2.0, -2.0, -3.0]), np.array([2.0, 2.0, 1.0]), None if shaped is None else bodies, found)
+            pieces = np.concatenate([collection.get_segments() for collection in axes.collections] or [np.zeros((0, 2, 2))]).reshape(-1, 2, 2)
+            drawn = np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1).sum()
+            self.assertAlmostEqual(drawn, 0.0 if shaped is None else 8.0 - 2.0 * reach, delta=0.07, msg=f"{height} {shaped}")
+            self.assertEqual(len([patch for patch in axes.patches if len(patch.get_xy()) == 5 and np.ptp(patch.get_xy()) == 2.0]), 1 if shaped is None else 0)
+            plt.close(figure)
+
     def test_planes_within_the_box(self):
         """A plane along the axes that is no face of the box is drawn: filled behind its bodies, an outline before them."""
         rows = gravier.Table({"shape": np.array(["plane"] * 4), "position": np.array([[0.5, 0.0, 0.0], [0.7, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -422,7 +400,7 @@ class Pictures(RunTestCase):
         figure = curve_pictures.draw_profile(self.disks, "layers", "all", ["pressure"], False)
         self.assertEqual(len(figure.axes[0].lines), 3)
         plt.close(figure)
-        gravier_plot.main(["profile", self.here("disks/results"), "--out", self.here("profile.png")])
+        gravier_plot.main(["profile", self.here("disks/results"), "--steps", "60:", "--out", self.here("profile.png")])
         self.assertGreater(matplotlib.image.imread(self.here("profile.png"))[:, :, :3].std(), 0.03)
         for name, columns, words in (("middle", ["pressure"], "no region middle with bins; expected one of layers"),
                                      (None, ["speed"], "no column speed of a profile; expected one of solid_fraction")):

@@ -224,6 +224,21 @@ class Report(RunTestCase):
                 "good": "", "doubt": f"{depth} of the mean radius. Half of the step shows whether the results depend on it.",
                 "bad": f"{depth} of the mean radius. Take a smaller step."}[grade])
 
+    def test_axes_of_places(self):
+        """Curves of places fit their panel, wherever 0 is; those of forces do not."""
+        table = gravier.results.Table({"time": np.arange(4.0), "force_y:lid": np.arange(1.0, 5.0), "position_y:lid": np.array([0.3, 0.2, 0.1, 0.01])})
+        self.assertEqual([(panel.label, panel.places) for panel in figures.boundary_panels(table)], [("force along y [N]", False), ("position along y [m]", True)])
+
+    def test_steps_above_the_goal(self):
+        """One step that missed its goal is one step, not steps; what missed something else is said beside it."""
+        for above, missed, words in ((2, 2, "It was above this goal in 2 steps."), (1, 1, "It was above this goal in 1 step."),
+                                     (1, 2, "It was above this goal in 1 step, and in 1 more what else the criterion asks for was missed.")):
+            step = np.arange(1, 5)
+            history = gravier.results.Table(step=step, velocity_error=np.where(step <= above, 2e-3, 1e-4), velocity_scale=np.full(4, 1e-2), converged=step > missed)
+            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n"), history, {})
+            self.assertEqual(answer.grade, "bad")
+            self.assertTrue(answer.text.endswith(words), answer.text)
+
     def test_drift(self):
         """Motion below the errors of solves casts doubt on an accuracy that was reached."""
         history = gravier.results.Table(step=np.arange(1, 5), velocity_error=np.full(4, 1e-4), velocity_scale=np.full(4, 1e-2), converged=np.ones(4))
@@ -239,6 +254,8 @@ class Report(RunTestCase):
         (answer,) = verdict.too_fast(table)
         self.assertEqual(answer.grade, "doubt")
         self.assertIn("4 times something moved by more than half of its thickness in a step, in 2 steps", answer.text)
+        table["fast"][:] = [0, 0, 1, 0]
+        self.assertIn("Not always: 1 time something moved by more than half of its thickness in a step, in 1 step.", verdict.too_fast(table)[0].text)
         table["fast"][:] = 0
         self.assertEqual(verdict.too_fast(table), [])
 
@@ -285,7 +302,7 @@ class Report(RunTestCase):
         history = gravier.Run(self.here("poor/results")).history()
         missed = history.converged == 0
         above = (missed & (history.velocity_error > 1e-6 * history.velocity_scale)).sum()
-        self.assertIn(f"with a goal of 1e-06; it was above it in {above} steps", self.answer(page, "Was the accuracy")[2])
+        self.assertIn(f"with a goal of 1e-06. It was above this goal in {above} steps", self.answer(page, "Was the accuracy")[2])
         # a solve may miss another condition of the criterion
         self.assertEqual(f"and in {missed.sum() - above} more" in self.answer(page, "Was the accuracy")[2], missed.sum() > above)
         self.assertIn("NOT CONVERGED", page.text["warnings"])

@@ -45,8 +45,8 @@ class Moves(SmallScene):
         self.both(check)
 
     def test_oscillation(self):
-        """A plane that moves by A sin(2 pi f t + phase) beside its constant velocity, or beside its table, drives what is glued to
-        nothing: where it is, of second order, and back after each period; about its pivot it turns by the angle in the same manner."""
+        """A plane that moves by A (sin(2 pi f t + phase) - sin(phase)) beside its constant velocity, or beside its table, drives what is
+        glued to nothing: where it is, of second order, and back after each period; about its pivot it turns by such an angle."""
         amplitude, frequency, phase = 0.02, 8.0, 0.7
 
         def check(dimension):
@@ -70,12 +70,12 @@ class Moves(SmallScene):
                 self.assertLess(abs(away["velocity", steps] - away["table", steps]), 1e-14, case)
             self.assertGreater(np.log2(away["velocity", 128] / away["velocity", 256]), 1.95, case)
             turns = [0.3] if dimension == 2 else [0.0, 0.3, 0.0]
-            record = self.play(f"rocks {dimension}", far, [plane(0 * along, along, rotation_oscillation=turns, frequency=frequency)],
+            record = self.play(f"rocks {dimension}", far, [plane(0 * along, along, rotation_oscillation=turns, frequency=frequency, phase=phase)],
                                steps=256, time={"step": 0.5 / 256})
-            turned = 0.3 * np.sin(2.0 * np.pi * frequency * record.time)
+            turned = 0.3 * (np.sin(2.0 * np.pi * frequency * record.time + phase) - np.sin(phase))
             normal = record.boundary["normal"][:, 0]
             self.verify(case, "angle of a plane that rocks [rad]", np.arcsin(-normal[:, -1] if dimension == 3 else normal[:, 1]), turned,
-                        1.01 * 0.3 * (2.0 * np.pi * frequency * 0.5 / 256) ** 2 / 12.0)
+                        1.01 * 0.3 * (1.0 + np.sin(phase)) * (2.0 * np.pi * frequency * 0.5 / 256) ** 2 / 12.0)
         self.both(check)
 
     def test_repeats(self):

@@ -200,8 +200,8 @@ class Run:
         return Table({"boundary": boundary, "corners": corners @ rows.axes[of] + rows.position[of][:, None, :]})
 
     def contacts(self, step=None):
-        """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s] and, where bodies have shapes, point (n, d), the place
-        of the contact, and with tangential springs elongation (n, d); None where none are written."""
+        """candidate, antagonist, normal (n, d), gap, impulse (n, d) as n, t[, s]; moment (n, 1 or 3) with rolling or pivoting friction,
+        point (n, d) where bodies have shapes, elongation (n, d) with tangential springs; None where none are written."""
         return self._group(step, "contacts")
 
     def forces(self, step=None):

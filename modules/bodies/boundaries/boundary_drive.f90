@@ -22,7 +22,7 @@ module gravier_boundary_drive
     real(dp) :: velocity(3) = 0.0_dp, spin(3) = 0.0_dp
     !> of components that are free [N]; [Pa], or [N/m] in 2D
     real(dp) :: force(3) = 0.0_dp, pressure = 0.0_dp
-    !> amplitudes of the displacement [m] and of the rotation [rad], which go with sin(2 pi f t + phase)
+    !> amplitudes A of the displacement [m] and of the rotation [rad] since time 0, A (sin(2 pi f t + phase) - sin(phase))
     real(dp) :: oscillation(3) = 0.0_dp, rotation_oscillation(3) = 0.0_dp
     !> f [Hz], phase [rad]
     real(dp) :: frequency = 0.0_dp, phase = 0.0_dp

@@ -1,0 +1,108 @@
+"""Curves of gravier_plot: the limits and labels of axes, and the steps of a profile."""
+import os
+import sys
+import unittest
+from types import SimpleNamespace
+
+import matplotlib.pyplot as plt
+import numpy as np
+from gravier_runs import SOURCE
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
+import curve_pictures  # noqa: E402
+import gravier_plot  # noqa: E402
+from picture_style import PictureError  # noqa: E402
+
+
+class Axes(unittest.TestCase):
+
+    def test_limits(self):
+        flat = np.full(50, 3.0)
+        for values, scale, low, high in ((np.linspace(0.0, 2.0, 11), "linear", 0.0, 2.1), (np.linspace(10.0, 11.0, 11), "linear", 9.95, 11.05),
+                                         (flat, "linear", 2.85, 3.15), (np.zeros(3), "linear", -0.5, 0.5),
+                                         (np.linspace(-2.0, 0.0, 5), "linear", -2.1, 0.0), (np.array([np.nan]), "linear", 0.0, 1.0),
+                                         (np.geomspace(1e-4, 1.0, 41), "log", 1e-4 / 1.5, 1.5)):
+            found = curve_pictures.limits_of(values)
+            self.assertEqual(found[0], scale)
+            np.testing.assert_allclose(found[1:], (low, high), rtol=1e-12)
+        # a few small values do not make logarithms, and on logarithms they do not take the space of the others
+        self.assertEqual(curve_pictures.limits_of(np.append(flat, [1e-12, 1e-9]))[0], "linear")
+        scale, low, _ = curve_pictures.limits_of(np.append(np.geomspace(1e-3, 1.0, 99), 1e-30))
+        self.assertEqual(scale, "log")
+        self.assertGreater(low, 1e-7)
+        self.assertEqual(curve_pictures.limits_of(np.geomspace(1e-4, 1.0, 41), logarithms=False)[:2], ("linear", 0.0))
+
+    def test_labels(self):
+        for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
+                                       ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
+                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
+                                       ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
+                                       ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
+                                       ("force_x:hard_work", 2, "force x:hard work [N]")):
+            self.assertEqual(curve_pictures.label_of(name, dimension), label)
+        for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):
+            self.assertEqual(curve_pictures.label_of_all(name, [3, 2, 3]), label)
+        figure, axes = plt.subplots()
+        curve_pictures.Panel("energy [J]", [(np.arange(99), np.geomspace(1e-3, 1.0, 99), "a"), (np.arange(99), np.zeros(99), "b"),
+                                            (np.arange(2), np.array([1.0, 1e-30]), "c")]).draw(axes)
+        self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["a", "b: 0", "c"])
+        self.assertEqual([text.get_text() for text in axes.texts], ["values go down to 1e-30"])
+        plt.close(figure)
+        figure, axes = plt.subplots()
+        curve_pictures.fit_axis(axes.yaxis, np.array([0.0, 25000.0]), "pressure [Pa]")
+        self.assertEqual((axes.get_ylabel(), axes.yaxis.get_major_formatter()(20000.0, 0)), ("pressure [$10^{3}$ Pa]", "20"))
+        plt.close(figure)
+
+    def test_from_zero(self):
+        """An axis begins at 0 where the values come down to a fifth of the largest one. That of places fits them in any case, without
+        logarithms; a place that differs by rounding alone is constant."""
+        for values, places, low, high in ((np.linspace(0.19, 1.0, 9), False, 0.0, 1.05), (np.linspace(0.3, 1.3, 11), False, 0.25, 1.35),
+                                          (np.linspace(-1.0, -0.19, 9), False, -1.05, 0.0), (np.linspace(0.1, 1.1, 11), True, 0.05, 1.15),
+                                          (np.geomspace(1e-4, 1.0, 41), True, -0.0499, 1.05), (np.linspace(-1.0, 0.0, 11), True, -1.05, 0.05),
+                                          (0.2 + 1e-16 * np.arange(9), True, 0.19, 0.21)):
+            scale, *found = curve_pictures.limits_of(values, places=places)
+            self.assertEqual(scale, "linear")
+            np.testing.assert_allclose(found, (low, high), atol=1e-4)
+        figure, panels = plt.subplots(2)
+        for name, axes in zip(("position_y:plate", "force_y:plate"), panels):
+            curves = [(np.arange(99.0), np.linspace(0.2, 0.03, 99), None)]
+            run = SimpleNamespace(directory="run", dimension=2, history=lambda: {"time": curves[0][0], name: curves[0][1]})
+            drawn = curve_pictures.draw_history([run], [name]).axes[0]
+            self.assertEqual(drawn.get_ylim()[0] > 0.02, name.startswith("position"), name)
+        plt.close("all")
+
+    def test_base(self):
+        """Numbers of a narrow range are told from what they all begin with, which the label has; ticks are where they say."""
+        figure, axes = plt.subplots()
+        for low, high, words, place, text in ((0.257931, 0.257940, "height\n− 0.25793 m [$10^{-6}$ m]", 0.257936, "6"),
+                                              (-0.257940, -0.257931, "height\n+ 0.25795 m [$10^{-6}$ m]", -0.257936, "14"),
+                                              (123456.0, 123466.0, "height\n− 123400 m [m]", 123460.0, "60"), (0.1, 0.2, "height [m]", None, None)):
+            curve_pictures.fit_axis(axes.yaxis, np.array([low, high]), "height [m]", places=True)
+            self.assertEqual(axes.get_ylabel(), words)
+            if text:
+                self.assertEqual(axes.yaxis.get_major_formatter()(place, 0), text)
+        curve_pictures.fit_axis(axes.yaxis, np.array([100000.0, 100001.0]), "contacts")
+        self.assertEqual(axes.get_ylabel(), "contacts\n− 99990")
+        plt.close(figure)
+
+
+class Steps(unittest.TestCase):
+
+    def test_of_a_profile(self):
+        """Steps are all written ones but the start, numbers, or ranges with both ends, without one or without both."""
+        run = SimpleNamespace(path="results.h5", steps=[0, 50, 100, 150, 200], find_step=lambda step: 200 if step is None else step)
+        for text, steps in (("all", [50, 100, 150, 200]), ("150,50", [50, 150]), ("100:", [100, 150, 200]), ("60:150", [100, 150]), (":100", [50, 100]),
+                            (":", [50, 100, 150, 200]), ("50,140:160", [50, 150]), ("100:150,150:", [100, 150, 200])):
+            self.assertEqual(curve_pictures.steps_of_profile(run, gravier_plot.steps_of(text)), steps, text)
+        self.assertEqual(curve_pictures.steps_of_profile(run, [None]), [200])
+        with self.assertRaisesRegex(PictureError, "results.h5: no written step from 110 to 140; expected some of 50 to 200"):
+            curve_pictures.steps_of_profile(run, [(110, 140)])
+        with self.assertRaisesRegex(PictureError, "no step with means over regions; expected one after the start"):
+            curve_pictures.steps_of_profile(SimpleNamespace(path="results.h5", steps=[0]), "all")
+        for text in ("", "a", "1:2:3", "-5", "1,,2", "1.5"):
+            with self.assertRaisesRegex(gravier_plot.argparse.ArgumentTypeError, "expected all, or steps and ranges of them such as 100,5000:8000"):
+                gravier_plot.steps_of(text)
+
+
+if __name__ == "__main__":
+    unittest.main()
