@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from oracle_table import Bounds
-from study_support import (OneLineParser, claimed, draw_disks, gravier, lattice, plt, read_history, run, run_study, sized, whole, write_csv,
-                           write_hdf5)
+from study_support import (OneLineParser, claimed, draw_disks, gravier, lattice, plt, read_history, run, run_study, sized, whole,
+                           write_csv, write_hdf5)
 from whole_file import save_figure
 
 SMALLEST, LARGEST = 0.004, 0.006  # m
@@ -49,8 +49,8 @@ def lower(options, centres, radii):
 
 
 def profiles(folder):
-    """Means over all steps while the floor goes down, by layers from the top: depth of their middle, vertical and lateral stress, and the
-    stress there of the fill without walls; then the stress on the floor, and friction and normal force of both sides."""
+    """Means over all steps while the floor goes down, by layers from the top: depth of their middle, vertical and lateral stress,
+    and the stress there of the fill without walls; then the stress on the floor, and friction and normal force of both sides."""
     found = gravier.Run(folder)
     layers = found.region_mean("layers", [step for step in found.steps if step > SETTLING + WARMING])
     up = slice(None, None, -1)
@@ -59,7 +59,8 @@ def profiles(folder):
     load = (DENSITY * 9.81 * thick * layers.solid_fraction)[up]
     history = read_history(folder)
     late = history["step"] > SETTLING + WARMING
-    force = {name: history[name][late].mean() for name in ("force_y:floor", "force_x:left", "force_y:left", "force_x:right", "force_y:right")}
+    force = {name: history[name][late].mean()
+             for name in ("force_y:floor", "force_x:left", "force_y:left", "force_x:right", "force_y:right")}
     return (depth, layers.stress[up, 1, 1], layers.stress[up, 0, 0], np.cumsum(load) - 0.5 * load, -force["force_y:floor"] / WIDTH,
             -force["force_y:left"] - force["force_y:right"], abs(force["force_x:left"]) + abs(force["force_x:right"]))
 
@@ -111,7 +112,8 @@ def main():
     ratio = (lateral[middle] / vertical[middle]).mean()
     summary = {"lambda_over_width": length / WIDTH, "K_fitted": WIDTH / (2.0 * FRICTION * length), "K_measured": float(ratio),
                "friction_mobilised": float(held / pushed), "bottom_stress_over_hydrostatic": float(bottom * WIDTH / weight),
-               "bottom_stress_over_saturation": float(bottom / (rho_g * length)), "weight_borne": float((bottom * WIDTH + held) / weight)}
+               "bottom_stress_over_saturation": float(bottom / (rho_g * length)),
+               "weight_borne": float((bottom * WIDTH + held) / weight)}
     print(summary)
     write_csv(options.out / "study_silo.csv", {"depth": depth, "vertical_stress": vertical, "lateral_stress": lateral,
                                          "hydrostatic": hydrostatic})
