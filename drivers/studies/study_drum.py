@@ -58,7 +58,6 @@ def main():
         "scene": {"dimension": 2, "bodies": "file", "bodies_file": str(SOURCE / "data/scenes/drum.csv"), "density": DENSITY,
                   "friction": 0.5, "alert_distance": 1.5e-3},
         "time": {"step": 1.0e-3, "steps": QUICK if options.quick else FULL},
-        "solver": {"acceleration": "none", "tolerance": 1.0e-3, "max_iterations": 1000},
         "output": {"directory": ".", "every": 20, "contacts": False, "energy": True}},
         [{"name": "drum", "shape": "circle", "radius": RADIUS, "rotation": RATE, "friction": 0.8}])
     rows, moments, last = [], [], None

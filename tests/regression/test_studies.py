@@ -10,6 +10,7 @@ import tempfile
 import unittest
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 from forked_scripts import script
@@ -186,6 +187,26 @@ class ClosingTable(unittest.TestCase):
             {"largest_difference": 0.2, "bottom_stress_over_law": 1.2, "bottom_stress_over_hydrostatic": 0.9, "weight_borne": 0.9,
              "K_fitted": 0.7})
 
+    def test_silo_profiles(self):
+        """Means are of the steps after the warming alone; depths are from the top; forces are per step."""
+        late = study_silo.SETTLING + study_silo.WARMING
+        lower = np.array([[0.0, 0.1 * k] for k in range(4)])
+        layers = SimpleNamespace(lower=lower, upper=lower + [0.15, 0.1], centre=lower + [0.075, 0.05], solid_fraction=np.full(4, 0.8),
+                                 stress=np.array([np.diag([k, 10.0 * k]) for k in (4.0, 3.0, 2.0, 1.0)]))
+        asked = []
+        found = SimpleNamespace(steps=[0, late, late + 100, late + 200], region_mean=lambda name, steps: asked.append((name, steps)) or layers)
+        history = {"step": np.array([late, late + 1, late + 2]), "force_y:floor": np.array([-99.0, -1.0, -2.0]),
+                   "force_y:left": np.array([99.0, -3.0, -5.0]), "force_y:right": np.array([99.0, -1.0, -1.0]),
+                   "force_x:left": np.array([99.0, -8.0, -8.0]), "force_x:right": np.array([99.0, 10.0, 10.0])}
+        with mock.patch.object(study_silo.gravier, "Run", lambda folder: found), mock.patch.object(study_silo, "read_history", lambda folder: history):
+            depth, vertical, lateral, load, floor, held, pushed = study_silo.profiles("silo")
+        self.assertEqual(asked, [("layers", [late + 100, late + 200])])
+        np.testing.assert_allclose(depth, [0.05, 0.15, 0.25, 0.35])
+        np.testing.assert_allclose(vertical, [10.0, 20.0, 30.0, 40.0])
+        np.testing.assert_allclose(lateral, [1.0, 2.0, 3.0, 4.0])
+        np.testing.assert_allclose(load, 0.8 * study_silo.DENSITY * 9.81 * depth)
+        np.testing.assert_allclose([floor * study_silo.WIDTH, held, pushed], [1.5, 5.0, 18.0])
+
     def test_hopper(self):
         def judge(given):
             return study_hopper.accepted(2, study_hopper.PLANE, given["exponent"], given["k"], given["C"],
@@ -202,6 +223,27 @@ class ClosingTable(unittest.TestCase):
             slopes = {"flat": (given["by"], 0.0), "tall": (given["to"], 0.0)}
             return study_collapse.accepted(2, (ratio, out, np.full(4, 1e-3)), chosen, slopes)
         self.breaks(judge, {"flat": 2.0, "tall": 2.5, "by": 1.0, "to": 0.67}, {"flat": 4.0, "tall": 5.0, "by": 1.2, "to": 0.5})
+
+    def test_end_of_a_heap(self):
+        """The end of three rows of disks goes with the last disk, not from bin to bin; a cone of spheres ends where its layers do."""
+        radius, wide = 0.005, 4.0
+
+        def beyond(last, places):
+            x = np.arange(last, 0.0, -2.0 * radius)
+            rows = np.concatenate([np.column_stack([x, np.full_like(x, y)]) for y in (1.0, 3.0, 5.0)])
+            return study_collapse.length_of(rows, np.full(len(rows), radius), wide, places) - last
+        ends = np.linspace(0.5013, 0.5213, 9)
+        found = np.array([beyond(last, 20) for last in ends])
+        self.assertLess(np.ptp(found), 1.01 * wide * radius / 20)
+        self.assertLess(np.abs(found).max(), wide * radius)
+        # one bin alone knows the end to its width
+        self.assertGreater(np.ptp([beyond(last, 1) for last in ends]), 0.7 * wide * radius)
+        # six layers of spheres at random, of which none is about the axis
+        rng = np.random.default_rng(5)
+        place = rng.uniform(-0.2, 0.2, (9600, 3))
+        distance = np.hypot(place[:, 0], place[:, 1])
+        place = place[(distance < 0.2) & (distance > 1.5 * radius)]
+        self.assertAlmostEqual(study_collapse.length_of(place, np.full(len(place), radius), 1.0), 0.2, delta=wide * radius)
 
     def test_drum(self):
         time = np.linspace(0.0, 14.0, 1401)
@@ -220,6 +262,17 @@ class ClosingTable(unittest.TestCase):
             "solid_fraction_inner": 0.8, "coordination_mu0": 4.5, "pressure_right": 1.1, "pressure_lid": 0.9, "sin_phi": 0.32,
             "sin_phi_peak": 0.2, "solid_fraction_box": 0.8, "largest_overlap_over_radius": 0.02})
         self.assertEqual(judged(study_biaxial.accepted, {**good, "sin_phi": 0.32}, 600)[0], 0)
+
+    def test_solver_of_biaxial(self):
+        """The velocity error ends solves of the compression, unless a residual is told."""
+        place, made = Path(self.scratch()), []
+        options = SimpleNamespace(out=place, rate=0.01, strain=0.15, step=2e-3, tolerance=None, max_iterations=400, acceleration="none")
+        with mock.patch.object(study_biaxial, "run", lambda folder, groups, walls: made.append(groups["solver"])):
+            for options.tolerance in (None, 1e-3):
+                study_biaxial.compress(options, np.array([[0.01, 0.01]]), np.array([0.01]), np.array([1.0, 1.0]))
+        self.assertEqual(made[0], {})
+        self.assertEqual((made[1]["criterion"], made[1]["tolerance"], made[1]["max_iterations"], made[1]["acceleration"]),
+                         ("residual", 1e-3, 400, "none"))
 
     def test_drift(self):
         def judge(given):

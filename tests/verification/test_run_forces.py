@@ -26,6 +26,11 @@ class Forces(StudyTestCase):
             found = study_forces.exponents(np.concatenate([strong, weak]))
             for value, expected, off in zip(found, (beta, alpha, share), (0.02, 0.03, 1e-12)):
                 self.assertAlmostEqual(value, expected, delta=off)
+            self.assertAlmostEqual(study_forces.slope(weak), alpha, delta=0.03)
+        # weak forces that are no power of f: even from a tenth of the mean on, as many again below
+        even = np.concatenate([rng.random(90000) * 0.9 + 0.1, rng.random(90000) * 0.1])
+        self.assertAlmostEqual(study_forces.exponents(even)[1], -1.0 / np.log(even).mean() - 1.0, delta=1e-12)
+        self.assertLess(study_forces.exponents(even)[1], -0.4)
 
     def test_quick(self):
         """The strong forces are those of the publication; the status says what the table does."""
@@ -33,9 +38,10 @@ class Forces(StudyTestCase):
         with open(self.here("out", "study_forces.csv"), encoding="ascii", newline="") as file:
             rows = {(row["oracle"], row["quantity"].split(",")[0]): row for row in csv.DictReader(file)}
         self.assertEqual(done.returncode, int(any(row["within"] == "NO" for row in rows.values())), done.stderr)
-        self.assertEqual(len(rows), 9)
+        self.assertEqual(len(rows), 11)
         for name in ("rigid", "springs"):
             self.assertEqual(rows[name, "beta"]["within"], "yes", rows)
+            self.assertEqual(rows[name, "alpha"]["within"], "yes", rows)
             self.assertEqual(rows[name, "share of forces above the mean"]["within"], "yes", rows)
         self.assertTrue(os.path.exists(self.here("out", "study_forces.png")))
 
