@@ -302,8 +302,8 @@ contains
   end subroutine wake_marked
 
   !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: let all bodies be solved together in this
-  !> step, in views that are up to date. Changes that wake no single body then go on to all that bear them, and bodies that are still
-  !> at rest sleep on. Collective.
+  !> step, in views that are up to date. Changes that wake no single body then go on to all that bear them, and bodies that are
+  !> still at rest sleep on. Collective.
   subroutine rouse_stirred(rule, step, decomposition, halo)
     type(sleeping_rule_t), intent(in) :: rule
     !> that is to be made
