@@ -90,6 +90,7 @@ contains
         text = "&solver fallback = 'newton' takes over solves that stagnate"
       else if (tally%stagnated < max(tally%exhausted, tally%unbounded, tally%diverged)) then
         text = "a smaller &time step"
+        if (tally%diverged > 0 .and. solver%acceleration == "momentum") text = "&solver acceleration = 'none', or "//text
         if (tally%unbounded > 0) text = text//", or more room: bodies that cannot part are pressed together"
         if (tally%exhausted > max(tally%unbounded, tally%diverged)) text = "a larger &solver max_iterations, now "// &
           & to_text(solver%max_iterations)//", or "//text

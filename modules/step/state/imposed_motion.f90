@@ -6,14 +6,12 @@ module gravier_imposed_motion
   use gravier_physics, only: physics_t
   implicit none
   private
-  public :: imposed_motion_t, find_imposed, largest_imposed, steps_beside, unseen
+  public :: imposed_motion_t, find_imposed, largest_imposed, steps_beside
 
   !> steps before and after a time within which drives are looked at
   integer, parameter :: steps_beside = 10
-  !> times at most at which a slow drive is looked at: the last one is 5e9 steps away
-  integer, parameter :: most_looks = 30
-  !> diameters by which grains may drift without anybody's seeing it
-  real(dp), parameter :: unseen = 0.01_dp
+  !> steps in which a drive that begins from rest, or ends at rest, counts with more than its own velocity
+  integer, parameter :: steps_of_start = 30
 
   !> Of a time.
   type :: imposed_motion_t
@@ -48,10 +46,10 @@ contains
     motion%difference = max(motion%difference, norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*diameter)
   end subroutine find_imposed
 
-  !> The largest of three differences [m/s]: that of a time; those ten steps before and after it, so that a drive which starts from
-  !> rest or turns round counts with what it changes in ten steps, because an error of a tenth of that is what it changes in one;
-  !> where one of these is not 0, the mean over the time in which tables move grains by a way that nobody sees, because errors of
-  !> a tenth of that add up to a tenth of this way.
+  !> The largest of the differences of a time and of the times ten steps before and after it, so that a drive that turns round
+  !> counts with what it changes in ten steps: an error of a tenth of that is what it changes in one. A drive that begins from rest
+  !> counts with what it comes to in 30 steps, so that its first velocities do not ask for solves that are needlessly exact, and one
+  !> that ends likewise; one that has not begun yet does not count [m/s].
   pure real(dp) function largest_imposed(nd, boundaries, lever, diameter, physics, time, now) result(largest)
     integer, intent(in) :: nd
     type(boundary_t), intent(in) :: boundaries(:)
@@ -62,24 +60,31 @@ contains
     real(dp), intent(in) :: time
     !> what is imposed at that time
     type(imposed_motion_t), intent(in) :: now
-    logical :: changes, oscillates
+    real(dp) :: before
+    logical :: changes
     integer :: b, side
 
     largest = max(now%difference, physics%cell%fastest*diameter)
     changes = .false.
-    oscillates = .false.
     do b = 1, size(boundaries)
       changes = changes .or. boundaries(b)%drive%changes()
-      oscillates = oscillates .or. boundaries(b)%drive%oscillates()
     end do
     if (.not. changes) return
+    before = beside(-steps_beside)
+    if (.not. max(now%difference, before) > 0.0_dp) return
+    largest = max(largest, before, beside(steps_beside))
     do side = -1, 1, 2
-      largest = max(largest, difference_beside(nd, boundaries, lever, physics, time, side*steps_beside*physics%h))
+      if (.not. beside(-side*steps_of_start) > 0.0_dp) largest = max(largest, beside(side*steps_of_start))
     end do
-    if (oscillates .or. .not. largest > 0.0_dp) return
-    do side = -1, 1, 2
-      largest = max(largest, mean_difference(nd, boundaries, lever, physics, time, side*unseen*diameter))
-    end do
+
+  contains
+
+    !> The difference so many steps later, or earlier where they are negative [m/s].
+    pure real(dp) function beside(steps)
+      integer, intent(in) :: steps
+      beside = difference_beside(nd, boundaries, lever, physics, time, steps*physics%h)
+    end function beside
+
   end function largest_imposed
 
   !> What drives impose some duration after a time, or before it [m/s].
@@ -105,41 +110,6 @@ contains
     call compare(nd, boundaries, velocity, spin, lever, physics, beside)
     difference = beside%difference
   end function difference_beside
-
-  !> The mean of what tables impose over the time, from now on or until now, in which they move grains by a way; 0 where they do not
-  !> move them so far [m/s]. Times are looked at that are 10, 20, 40, ... steps away, with straight lines between them.
-  pure real(dp) function mean_difference(nd, boundaries, lever, physics, time, way) result(mean)
-    integer, intent(in) :: nd
-    type(boundary_t), intent(in) :: boundaries(:)
-    !> (boundaries) [m]
-    real(dp), intent(in) :: lever(:)
-    type(physics_t), intent(in) :: physics
-    !> [s]; the way is negative towards the past [m]
-    real(dp), intent(in) :: time, way
-    real(dp) :: left, near, far, start, duration
-    integer :: k
-
-    mean = 0.0_dp
-    if (.not. abs(way) > 0.0_dp) return
-    left = abs(way)
-    start = 0.0_dp
-    near = difference_beside(nd, boundaries, lever, physics, time, 0.0_dp)
-    duration = steps_beside*physics%h
-    do k = 1, most_looks
-      ! nothing moved before the first step
-      if (way < 0.0_dp) duration = min(duration, time - start)
-      if (.not. duration > 0.0_dp) return
-      far = difference_beside(nd, boundaries, lever, physics, time, sign(start + duration, way))
-      if (0.5_dp*(near + far)*duration >= left) exit
-      left = left - 0.5_dp*(near + far)*duration
-      start = start + duration
-      near = far
-      duration = start
-    end do
-    if (k > most_looks) return
-    ! the part of this interval in which a difference that grows from `near` by (far - near)/duration makes what is left
-    mean = abs(way)/(start + 2.0_dp*left/(near + sqrt(near**2 + 2.0_dp*left*(far - near)/duration)))
-  end function mean_difference
 
   !> Compare velocities of boundaries.
   pure subroutine compare(nd, boundaries, velocity, spin, lever, physics, motion)

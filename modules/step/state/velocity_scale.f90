@@ -6,8 +6,7 @@
 !>            h |g + f/rho|, h p d^2/m (2D: h p d/m) of a boundary on which forces p A act, or of a stress that a cell holds;
 !>            root mean square of what applied forces add to velocities; of attractions, where there is no other load
 !>     drive  largest difference of imposed velocities; of a cell that deforms, its rate of strain times d; now, ten steps
-!>            before or ten steps later, which counts where a drive starts or turns round; its mean while tables move grains by
-!>            0.01 d
+!>            before or ten steps later, which counts where a drive turns round, 30 steps where it begins or ends at rest
 !>     creep  0.01 d/T, the drift that nobody would see in the simulated time T
 !>     own    root mean square velocity of the bodies in contact at the start of the step, beside that of a cell that deforms. Spins
 !>            of bodies that are no disks or spheres count with their energy, because they bring surfaces towards each other
@@ -33,7 +32,7 @@ module gravier_velocity_scale
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_boundary_levers, only: find_levers
-  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed, unseen
+  use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
   use gravier_decomposition, only: decomposition_t
@@ -50,7 +49,8 @@ module gravier_velocity_scale
   !> Bodies count as wedged if they move by less than this part of the velocity that the impulses of a step would give to the mean
   !> grain. After impacts they move by half of it and more.
   real(dp), parameter :: little_motion = 0.2_dp
-
+  !> diameters by which grains may drift in the simulated time
+  real(dp), parameter :: drift = 0.01_dp
   !> The part of the velocity that bonds could give to the mean grain in a step which U may have at most: the motion as a whole says
   !> nothing of the forces that bonds have to bear.
   real(dp), parameter :: share_of_bonds = 0.2_dp
@@ -182,7 +182,7 @@ contains
     if (sums(4) > 0.0_dp .and. self%mass > 0.0_dp) self%stress = sqrt(sums(3)/sums(4))/self%mass
     self%stiffness = 0.0_dp
     if (sums(9) > 0.0_dp) self%stiffness = sums(8)/sums(9)
-    if (self%duration > 0.0_dp) self%creep = unseen*self%diameter/self%duration
+    if (self%duration > 0.0_dp) self%creep = drift*self%diameter/self%duration
     call find_motion(decomposition%nd, sums(10:), self%own, self%mean(1:decomposition%nd), self%apart)
     self%frame(:) = motion%common
     if (.not. motion%bounded) then

@@ -105,6 +105,15 @@ contains
       simulation%tally%unbounded = round
       call check((index(mending_text(simulation), "more room") > 0) .eqv. round == 1, "more room where a solve has no solution")
     end do
+    ! momentum may let solves diverge
+    simulation%tally%unbounded = 0
+    simulation%tally%diverged = 4
+    do round = 0, 1
+      simulation%config%solver%acceleration = trim(merge("none    ", "momentum", round == 0))
+      call check((index(mending_text(simulation), "acceleration = 'none'") > 0) .eqv. round == 1, &
+        & "no momentum where solves diverge")
+    end do
+    simulation%tally%diverged = 0
     ! all solves have stagnated, and no other method is left: a smaller step is offered, but not with rolling resistance
     simulation%tally%stagnated = 4
     simulation%tally%exhausted = 0
