@@ -42,7 +42,7 @@ METHODS = {
 
 
 #: methods that serve moments, and words of the others' refusals
-PLAIN = ("nlgs", "nscdd", "schwarz")
+SERVE_MOMENTS = ("nlgs", "nscdd", "schwarz", "newton")
 MOMENTS = "with rolling or pivoting friction"
 
 
@@ -87,7 +87,7 @@ class Case:
     may_fail: tuple = ()
     #: exit statuses and words of a run that is refused or stopped
     ends: tuple = ()
-    #: words by which methods other than those of PLAIN refuse the case
+    #: words by which methods other than those that serve moments refuse the case
     refuses: str = ""
     #: velocities are unique, and those of two methods agree to this part of the largest speed (falls of a step included)
     agree: float = 0.0
@@ -137,7 +137,7 @@ class Played:
         case, run = self.case, self.run
         said = run.stdout + run.stderr
         ends = case.ends
-        if case.refuses and self.groups["solver"]["method"] not in PLAIN:
+        if case.refuses and self.groups["solver"]["method"] not in SERVE_MOMENTS:
             ends = (2,), case.refuses
         if ends:
             status, words = ends
@@ -470,7 +470,7 @@ def resistances():
              [Grain([0.15 * k, 0.05], radius=0.05, mass=10.0 ** (k - 2)) for k in range(5)], [floor()], incline,
              holds=at_rest(1e-5), refuses=MOMENTS),
         Case("rolling friction 10", "twelve disks that cannot roll are thrown into a box", heap(), heap_box(),
-             {"scene": {"friction": 0.5, "rolling_friction": 10.0}}, may_fail=("nscdd",), holds=overlaps_below(0.02, 0.5),
+             {"scene": {"friction": 0.5, "rolling_friction": 10.0}}, may_fail=("nscdd", "newton"), holds=overlaps_below(0.02, 0.5),
              refuses=MOMENTS),
         Case("rolling friction without friction", "moments alone turn the disks", heap(), heap_box(),
              {"scene": {"rolling_friction": 0.3}}, holds=overlaps_below(0.02, 0.5), refuses=MOMENTS),
@@ -493,7 +493,7 @@ def resistances():
         Case("sticky heap", "twelve disks that attract each other with 100 times their weight are thrown into a box", heap(),
              heap_box(), sticky(100 * 0.7 * G), holds=overlaps_below(0.02, 0.5)),
         Case("sticky heap that rolls badly", "the same with rolling friction 0.3 of the law", heap(), heap_box(),
-             sticky(100 * 0.7 * G, rolling_friction=0.3), may_fail=("nscdd",), holds=overlaps_below(0.02, 0.5),
+             sticky(100 * 0.7 * G, rolling_friction=0.3), may_fail=("nscdd", "newton"), holds=overlaps_below(0.02, 0.5),
              refuses=MOMENTS),
         Case("sleeping lattice", "disks fall asleep under a tolerance of 1e-4", square(4), box(8 * 0.05), asleep, steps=60,
              holds=together(at_rest(1e-2), overlaps_below(1e-3))),
