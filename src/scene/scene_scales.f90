@@ -232,7 +232,10 @@ contains
           self%pressure = pressure
           self%pressed = b
         end if
-        if (pressure > 0.0_dp) gain(b) = max(gain(b), simulation%physics%h*pressure*area(b)/boundaries(b)%mass)
+        if (pressure > 0.0_dp) then
+          self%load = max(self%load, physics%h*pressure*min(area(b), self%diameter**(nd - 1))/simulation%velocity_scale%mass)
+          gain(b) = max(gain(b), physics%h*pressure*area(b)/boundaries(b)%mass)
+        end if
         speed = imposed_speed(boundaries(b), simulation%velocity_scale%lever(b))
         if (speed > self%speed) then
           self%speed = speed
@@ -249,7 +252,6 @@ contains
       self%heaviest = minloc(gain, dim=1, mask=gain > 0.0_dp)
       self%gain = gain(self%heaviest)
     end if
-    self%load = simulation%physics%h*self%pressure*self%diameter**(nd - 1)/simulation%velocity_scale%mass
   end subroutine scan
 
   !> Speed of the fastest point of a boundary, as far as it is imposed [m/s].

@@ -438,12 +438,12 @@ contains
     load = physics%h*norm2(physics%gravity(1:nd) + physics%body_force(1:nd)*grain_volume(nd, 0.5_dp*self%diameter)/self%mass)
     if (physics%cell%is_driven) load = max(load, maxval(abs(physics%cell%impulse))*self%diameter**(nd - 1)/self%mass)
     do b = 1, size(boundaries)
-      load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, area(b))*self%diameter**(nd - 1)/self%mass)
+      ! what is smaller than a grain presses on one with all of its force
+      load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, area(b))*min(area(b), self%diameter**(nd - 1))/self%mass)
     end do
   end function velocity_scale_load_of
 
-  !> Force on a boundary over the area that it works on, at least d^2 (d in 2D): a smaller one presses on one grain with all of its
-  !> force [Pa, N/m in 2D]; 0 where no force moves it.
+  !> Force on a boundary over the area that it works on [Pa, N/m in 2D]; 0 where no force moves it.
   pure real(dp) function velocity_scale_pressure_of(self, nd, boundary, time, area) result(pressure)
     class(velocity_scale_t), intent(in) :: self
     integer, intent(in) :: nd
@@ -455,7 +455,7 @@ contains
     pressure = 0.0_dp
     if (.not. (boundary%is_driven() .and. boundary%present .and. area > 0.0_dp) .or. self%diameter <= 0.0_dp) return
     call boundary%applied_force(nd, time, area, force)
-    pressure = norm2(force)/max(area, self%diameter**(nd - 1))
+    pressure = norm2(force)/area
   end function velocity_scale_pressure_of
 
   !> The rule.

@@ -343,6 +343,8 @@ contains
     integer, intent(in) :: nd
     type(scene_t) :: scene
     type(simulation_t) :: sim
+    real(dp), parameter :: small(1) = 1.0e-3_dp*radius, large(1) = 1.0e3_dp*radius
+    type(boundary_t) :: plate(1)
     real(dp) :: mass, creep
 
     mass = grain_mass(nd, radius, density)
@@ -362,11 +364,14 @@ contains
     scene = scene_t(nd=nd, pressure=1000.0_dp)
     call assemble(comm, scene, sim)
     call check_scale(sim, step*1000.0_dp*(2.0_dp*radius)**(nd - 1)/mass, "load of a step", "pressure")
+    plate(1) = pressed_plate(1000.0_dp)
     ! on a plate that is smaller than a grain all of its force acts on one grain
-    call check_close(sim%velocity_scale%pressure_of(nd, pressed_plate(1000.0_dp), 0.0_dp, 1.0e-3_dp*radius), &
-      & 1000.0_dp/(2.0_dp*radius)**(nd - 1), rounding*1000.0_dp/(2.0_dp*radius)**(nd - 1), "a plate smaller than a grain")
-    call check_close(sim%velocity_scale%pressure_of(nd, pressed_plate(1000.0_dp), 0.0_dp, 1.0e3_dp*radius), 1.0_dp/radius, &
-      & rounding/radius, "a large plate")
+    call check_close(sim%velocity_scale%load_of(nd, plate, sim%physics, 0.0_dp, small), &
+      & step*1000.0_dp/mass, rounding*step*1000.0_dp/mass, "a plate smaller than a grain")
+    call check_close(sim%velocity_scale%load_of(nd, plate, sim%physics, 0.0_dp, large), &
+      & step/radius*(2.0_dp*radius)**(nd - 1)/mass, rounding*step/radius/mass, "a large plate")
+    call check_close(sim%velocity_scale%pressure_of(nd, plate(1), 0.0_dp, small(1)), 1.0e6_dp/radius, &
+      & rounding*1.0e6_dp/radius, "its pressure is that of its area")
     ! attraction is an internal force where there is another load
     scene = scene_t(nd=nd, adhesion=3.0_dp, gravity=1.0e-3_dp)
     call assemble(comm, scene, sim)
