@@ -20,8 +20,8 @@ module gravier_waking
 
   !> momentum of a sleeping body, over that which wakes it, from which on its impulses count as changed
   real(dp), parameter :: unnoticed = 1.0e-3_dp
-  !> numbers of steps at rest until a body sleeps, after which all are solved together if impulses on some have changed
-  integer, parameter :: rounds = 5
+  !> numbers of steps at rest until a body sleeps, after which all wake if impulses on some have changed
+  integer, parameter :: rounds = 10
 
   !> What is left out of a problem.
   type :: resting_t
@@ -45,7 +45,7 @@ contains
     type(halo_t), intent(inout) :: halo
     type(resting_t), intent(out) :: resting
 
-    call rouse_stirred(rule, step, decomposition, halo)
+    call wake_stirred(rule, step, decomposition, halo)
     call watch_awake(decomposition, halo, resting)
   end subroutine watch_step
 
@@ -301,16 +301,15 @@ contains
     call halo%refresh(decomposition)
   end subroutine wake_marked
 
-  !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: let all bodies be solved together in this
-  !> step, in views that are up to date. Changes that wake no single body then go on to all that bear them, and bodies that are
-  !> still at rest sleep on. Collective.
-  subroutine rouse_stirred(rule, step, decomposition, halo)
+  !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: wake all bodies, in views that are up to date.
+  !> Changes that wake no single body then go on to all that bear them, and contacts that yield have the time to do so. Collective.
+  subroutine wake_stirred(rule, step, decomposition, halo)
     type(sleeping_rule_t), intent(in) :: rule
     !> that is to be made
     integer, intent(in) :: step
     type(decomposition_t), intent(inout) :: decomposition
     type(halo_t), intent(inout) :: halo
-    integer :: s, k
+    integer :: s
     logical :: some
 
     if (modulo(step, rule%after) /= 0 .or. modulo(step/rule%after, rounds) /= 0) return
@@ -319,15 +318,9 @@ contains
       some = some .or. any(decomposition%owned(s)%stirred > 0)
     end do
     if (.not. decomposition%comm%any_true(some)) return
-    do s = 1, size(decomposition%owned)
-      associate (owned => decomposition%owned(s))
-        do k = 1, owned%n
-          if (owned%sleeps(k)) call owned%rouse(k)
-        end do
-      end associate
-    end do
+    call wake_all(decomposition)
     call halo%refresh(decomposition)
-  end subroutine rouse_stirred
+  end subroutine wake_stirred
 
   !> Wake all bodies of this rank; views are to be brought up to date.
   pure subroutine wake_all(decomposition)
