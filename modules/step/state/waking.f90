@@ -301,7 +301,7 @@ contains
     call halo%refresh(decomposition)
   end subroutine wake_marked
 
-  !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: wake all bodies, in views that are up to date.
+  !> Every `rounds` times `after` steps, if impulses on bodies that sleep have changed: wake all, in views that are up to date.
   !> Changes that wake no single body then go on to all that bear them, and contacts that yield have the time to do so. Collective.
   subroutine wake_stirred(rule, step, decomposition, halo)
     type(sleeping_rule_t), intent(in) :: rule
