@@ -11,7 +11,8 @@
 !> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
 !> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left
 !> out would together give it a momentum of more than the l of the step in which it fell asleep, it wakes with those around it, and
-!> the step is solved anew. See doc/theory.md, section 12.
+!> the step is solved anew. Changes that wake none are marked, and all wake some steps later (gravier_waking). See doc/theory.md,
+!> section 12.
 module gravier_sleeping
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
@@ -44,7 +45,7 @@ module gravier_sleeping
     logical, allocatable :: rests(:)
     !> steps at rest, with this one (n_grains); places in the view (n_columns)
     integer, allocatable :: steps(:), seen(:)
-    !> momenta that the step leaves to the grains (nv, n_grains) [N s, N m s]
+    !> momenta that the step leaves to the grains that fall asleep, 0 of others (nv, n_grains) [N s, N m s]
     real(dp), allocatable :: left(:, :)
   end type rest_t
 
@@ -94,11 +95,14 @@ contains
         call problem%shared%sum_copies(s, own%restless, mean=.false.)
         call find_seen(view%list, sub, own%seen)
         allocate (own%steps(sub%n_grains), source=0)
-        own%left = sub%v_global(:, 1:sub%n_grains)
+        allocate (own%left(problem%kernels%nv, sub%n_grains), source=0.0_dp)
         do b = 1, sub%n_grains
-          call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), own%left(:, b))
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
           own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
+          if (own%steps(b) >= rule%after) then
+            own%left(:, b) = sub%v_global(:, b)
+            call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), own%left(:, b))
+          end if
           if (stops .and. 2*own%steps(b) >= rule%after) sub%v_global(:, b) = 0.0_dp
         end do
         call find_leaving(sub, rule%after, own%steps, leaving(s)%are)
