@@ -19,7 +19,7 @@ module gravier_proximal_law
   private
   public :: proximal_law_t, parts_of
 
-  !> tangential impulse, moments against rolling and against pivoting
+  !> parts of an impulse that the normal part bounds, at most: the tangential one, and the moments against rolling and pivoting
   integer, parameter :: most_parts = 3
 
   !> Components of an impulse that one coefficient times the normal part bounds.
