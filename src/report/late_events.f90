@@ -1,12 +1,12 @@
 !> What the log says of events that have their time: boundaries that are removed, and those that a run ends before, insertions that
-!> begin and boundaries that are removed only after its end.
+!> begin and boundaries that are removed only after its end, and grains that have fallen below all boundaries.
 module gravier_late_events
   use gravier_kinds, only: dp
-  use gravier_text, only: to_text
+  use gravier_text, only: to_text, counted
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: late_warnings, removal_lines
+  public :: late_warnings, removal_lines, fallen_warning
 
   character(len=*), parameter :: newline = new_line("a")
   !> part of a step that roundings of times take
@@ -73,5 +73,17 @@ contains
       end associate
     end do
   end function removal_lines
+
+  !> That grains have fallen below all boundaries.
+  function fallen_warning(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    associate (fallen => simulation%fallen)
+      text = "warning     by step "//to_text(simulation%step)//" "//counted(fallen%number, "grain")// &
+        & trim(merge(" has ", " have", fallen%number == 1))//" fallen below all boundaries, the one of the lowest number being "// &
+        & to_text(fallen%first)//": nothing stops what falls there, and an &boundary of shape 'outlet' would remove it"
+    end associate
+  end function fallen_warning
 
 end module gravier_late_events

@@ -7,16 +7,17 @@ module gravier_progress
   implicit none
   private
   public :: progress_t, duration_text
-  public :: warn_unconverged, warn_fast, warn_lowered, warn_acceleration, warn_relaxation, warn_partition, warn_springs, warn_deep
-  public :: note_balance, note_scale
+  public :: warn_unconverged, warn_fast, warn_lowered, warn_acceleration, warn_relaxation, warn_partition, warn_springs
+  public :: warn_deep, warn_fallen, note_balance, note_scale
 
   integer, parameter :: warn_unconverged = 1, warn_fast = 2, warn_lowered = 3, warn_acceleration = 4, warn_relaxation = 5, &
-    & warn_partition = 6, warn_springs = 7, warn_deep = 8, note_balance = 9, note_scale = 10
-  integer, parameter :: n_kinds = 10
+    & warn_partition = 6, warn_springs = 7, warn_deep = 8, warn_fallen = 9, note_balance = 10, note_scale = 11
+  integer, parameter :: n_kinds = 11
   !> what the closing line calls them; a note is not counted there
-  character(len=*), parameter :: kind_names(8) = [character(len=44) :: "solves above the tolerance", &
+  character(len=*), parameter :: kind_names(9) = [character(len=44) :: "solves above the tolerance", &
     & "grains too fast for the step", "search directions lowered", "Nesterov momentum suspended", "relaxation factors lowered", &
-    & "partitions refused", "springs too stiff for the step", "contacts pressed deep into bodies"]
+    & "partitions refused", "springs too stiff for the step", "contacts pressed deep into bodies", &
+    & "grains fallen below all boundaries"]
   !> said in full, of each kind
   integer(i8), parameter :: first_ones = 5
   !> lines of steps that are always written

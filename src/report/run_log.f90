@@ -14,14 +14,14 @@ module gravier_run_log
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_memory_report, only: memory_report_t, report_memory
   use gravier_progress, only: progress_t, duration_text, warn_unconverged, warn_fast, warn_lowered, warn_acceleration, &
-    & warn_relaxation, warn_partition, warn_springs, warn_deep, note_balance, note_scale
+    & warn_relaxation, warn_partition, warn_springs, warn_deep, warn_fallen, note_balance, note_scale
   use gravier_scene_scales, only: scene_scales_t
   use gravier_scale_report, only: scale_lines, scale_warnings, error_scale_line, distance_line, most_by_spring, spring_warning, &
     & fast_warning
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
-  use gravier_late_events, only: late_warnings, removal_lines
+  use gravier_late_events, only: late_warnings, removal_lines, fallen_warning
   use gravier_rounding_lines, only: rounding_warnings
   use gravier_sample_lines, only: sample_warnings
   use gravier_intact_bonds, only: count_bonds
@@ -434,6 +434,7 @@ contains
       self%told_stiffest = simulation%tally%stiffest
       call warn(self, warn_springs, 1_i8, "warning     "//spring_warning(simulation), error)
     end if
+    if (simulation%fallen%more > 0) call warn(self, warn_fallen, simulation%fallen%more, fallen_warning(simulation), error)
     call write_recoveries(self, simulation, simulation%step, error)
     if (figures%solve%status /= solve_converged) call warn(self, warn_unconverged, 1_i8, "  *** "// &
       & failure_text(simulation, figures)//" in step "//to_text(simulation%step), error)

@@ -226,6 +226,8 @@ contains
         & " bodies moved by no more than the errors of solves, and came "// &
         & plain(simulation%drift%length()/simulation%velocity_scale%diameter)//" mean diameters away: see `drift`"
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
+      if (simulation%fallen%number > 0) text = text//"; "//counted(simulation%fallen%number, "grain")// &
+        & " had fallen below all boundaries"
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text

@@ -16,6 +16,7 @@ module gravier_simulation
   use gravier_pair_places, only: has_facets
   use gravier_impulse_memory, only: memory_of
   use gravier_step_figures, only: step_figures_t
+  use gravier_fallen_grains, only: fallen_grains_t
   use gravier_time_stepper, only: time_stepper_t
   use gravier_config_types, only: config_t
   use gravier_scene_thickness, only: mean_half_thickness
@@ -53,6 +54,8 @@ module gravier_simulation
     real(dp) :: first_length(3) = 0.0_dp
     !> mass of the free grains of the scene at its start [kg]
     real(dp) :: first_mass = 0.0_dp
+    !> in the state of the last look
+    type(fallen_grains_t) :: fallen
     !> step written last in results.h5, -1 for none
     integer :: last_written = -1
     !> the state comes from a checkpoint

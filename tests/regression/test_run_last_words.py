@@ -307,3 +307,59 @@ class LastWords(RunTestCase):
 if __name__ == "__main__":
     import unittest
     unittest.main()
+
+
+class FallenGrains(RunTestCase):
+    """Grains below all boundaries are told of once, and in the last words; those that something may stop are not."""
+
+    #: three disks above a ledge of 1 m, two beside it
+    DISKS = ((3, -0.2, 0.05), (4, 0.0, 0.05), (7, 0.2, 0.05), (9, 0.8, 0.0), (12, -0.9, 0.05))
+    LEDGE = {"name": "ledge", "shape": "segment", "point": [-0.5, 0.0], "end": [0.5, 0.0]}
+    FAR = {"name": "far", "shape": "plane", "point": [0.0, -1000.0], "normal": [0.0, 1.0]}
+    SIDE = {"name": "side", "shape": "plane", "point": [5.0, 0.0], "normal": [-1.0, 0.0]}
+
+    def run_with(self, boundaries, ranks=1, disks=DISKS, steps=250, **scene):
+        turned = scene.pop("turned", False)
+        rows = "".join(f"{number},{y if turned else x},{x if turned else y},0.05\n" for number, x, y in disks)
+        write(self.here("disks.csv"), "id,x,y,radius\n" + rows)
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "disks.csv", "gravity": [0.0, -9.81], **scene},
+                "time": {"step": 1e-3, "steps": steps}, "decomposition": {"subdomains": 2}, "solver": {"method": "nscdd"},
+                "output": {"directory": "results", "every": 0}}
+        run = run_case({**case, "boundary": boundaries}, ranks, self.here(""))
+        self.assert_status(run, 0)
+        return [text for text in run.stdout.splitlines() if "below all boundaries" in text]
+
+    def test_told_once(self):
+        told = ["warning     by step 200 2 grains have fallen below all boundaries, the one of the lowest number being 9: nothing stops "
+                "what falls there, and an &boundary of shape 'outlet' would remove it",
+                "warnings    grains fallen below all boundaries 2",
+                "finished    all 350 steps reached the accuracy; 2 grains had fallen below all boundaries; results in results"]
+        for ranks in (1, 2):
+            self.assertEqual(self.run_with([self.LEDGE, self.SIDE], ranks, steps=350), told)
+        one = self.run_with([self.LEDGE], disks=self.DISKS[:4])
+        self.assertRegex(one[0], "1 grain has fallen .* number being 9:")
+        self.assertRegex(one[-1], "; 1 grain had fallen")
+
+    def test_along_gravity(self):
+        """Down is where gravity points."""
+        upright = {"name": "ledge", "shape": "segment", "point": [0.0, -0.5], "end": [0.0, 0.5]}
+        self.assertRegex(self.run_with([upright], gravity=[-9.81, 0.0], turned=True)[0], "step 200 2 grains have")
+        # the two come down by 0.31 m, and begin at a height of 0 and of 0.05 m
+        wall = {"name": "wall", "shape": "segment", "point": [3.0, 0.0], "end": [3.0, -0.2]}
+        self.assertEqual([len(self.run_with([self.LEDGE, {**wall, "end": [3.0, -deep]}])) for deep in (0.1, 0.3)], [3, 0])
+
+    def test_glued_grains(self):
+        """Glued grains are boundaries, and do not fall themselves."""
+        boundaries = [{"name": "glued", "shape": "grains", "group": 1}]
+        rows = "".join(f"{k},{0.1 * k},-0.05,0.05,1\n" for k in range(1, 4)) + "8,0.2,0.06,0.05,0\n9,2,0,0.05,0\n"
+        for deep, fallen in (("", 3), ("7,5,-3,0.05,1\n", 0)):
+            write(self.here("glued.csv"), "id,x,y,radius,group\n" + rows + deep)
+            told = self.run_with(boundaries, bodies_file="glued.csv")
+            self.assertEqual(len(told), fallen, told)
+
+    def test_what_may_stop(self):
+        """A plane below, an outlet, a period along gravity; no gravity."""
+        below = {"name": "out", "shape": "outlet", "point": [0.0, -1000.0], "normal": [0.0, 1.0]}
+        for boundaries, scene in (([self.LEDGE, self.FAR], {}), ([self.LEDGE, below], {}), ([self.LEDGE], {"period": [0.0, 9.0]}),
+                                  ([self.LEDGE], {"gravity": [0.0, 0.0]}), ([self.SIDE], {})):
+            self.assertEqual(self.run_with(boundaries, **scene), [])
