@@ -9,6 +9,8 @@ from matplotlib.ticker import FuncFormatter
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
+from gravier import read_table
+
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
 #: the same without a hue, where components have their own
@@ -19,9 +21,9 @@ PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
-         (r"gravity_[xyz]", "m/s²")]
+         (r"gravity_[xyz]", "m/s²"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there
-PLACES = re.compile(r"(position|body)_[xyz]:")
+PLACES = re.compile(r"(position|body)_[xyz]:|front_")
 #: an axis begins at 0 where the least value is below this part of the largest one; a range below this part of the values has a base of its own
 NEAR, NARROW = 0.2, 1e-3
 NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
@@ -45,7 +47,7 @@ def label_of_all(name, dimensions):
 def label_of(name, dimension):
     """Name of a column of history.csv with its unit."""
     text = NAMES.get(name, name.replace("_", " "))
-    if re.search(r"(^|_)(stress_[xyz]{2}|pressure)$", name):
+    if re.search(r"(^|_)(stress_[xyz]{2}|pressure|axial_stress|lateral_stress)$", name):
         return f"{text} [{'N/m' if dimension == 2 else 'Pa'}]"
     if re.search(r"(^|_)volume$", name):
         return f"{text} [{'m²' if dimension == 2 else 'm³'}]"
@@ -161,15 +163,17 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
     return figure
 
 
-def draw_history(runs, columns, against="time", rows=1):
-    """A figure with a panel for each column of history.csv against time or another column, a line a run; with `rows` of means of so many steps."""
-    histories = [run.history() for run in runs]
+def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
+    """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
+    many rows. Columns are all that the first run has numbers in unless told."""
+    histories = [run.history() if table == "history.csv" else read_table(run.directory / table, ("time",)) for run in runs]
+    columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
         if len(history) == 0:
-            raise PictureError(f"{run.directory}/history.csv: no step; expected one at least")
+            raise PictureError(f"{run.directory / table}: no row; expected one at least")
         for name in [*columns, against]:
             if name not in history:
-                raise PictureError(f"{run.directory}/history.csv: no column {name}; expected one of {', '.join(history)}")
+                raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     if rows > 1:
         histories = [history.means(rows) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]

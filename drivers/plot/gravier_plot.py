@@ -27,6 +27,8 @@ from whole_file import PICTURES, claim, save_figure
 NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 #: along the longer side of a picture in dots: its memory is the square of them
 MOST_DOTS = 20000
+#: columns of history.csv that are drawn unless told
+HISTORY = "iterations,residual,kinetic_energy"
 
 
 def refuse(message):
@@ -74,8 +76,9 @@ def parse(arguments):
     packing = kinds.add_parser("packing", parents=[one, look], help="bodies, boundaries and force chains of a step")
     packing.add_argument("--step", type=int, metavar="N", help="a step that results.h5 holds; the last one unless told")
     packing.add_argument("--dpi", type=int, default=200, metavar="N", help="of a PNG (200)")
-    history = kinds.add_parser("history", parents=[several], help="columns of history.csv against time or another column")
-    history.add_argument("--columns", default="iterations,residual,kinetic_energy", metavar="A,B", help="%(default)s unless told")
+    history = kinds.add_parser("history", parents=[several], help="columns of history.csv, or of a table of gravier_measure, against time or another column")
+    history.add_argument("--columns", metavar="A,B", help=f"{HISTORY} unless told, of another table all")
+    history.add_argument("--table", default="history.csv", metavar="FILE", help="another table in each DIR, such as mixing.csv of gravier_measure")
     history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain")
     convergence = kinds.add_parser("convergence", parents=[several], help="residual and jump of a solve (&output trace = .true.)")
@@ -120,7 +123,7 @@ def draw(options):
     """Draw what is asked for, into --out or the first directory."""
     directories = options.directory if isinstance(options.directory, list) else [options.directory]
     sample = options.kind == "packing" and directories[0].suffix == ".h5"
-    out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{options.kind}.png")
+    out = options.out or (directories[0].with_suffix(".png") if sample else directories[0] / f"{Path(options.table).stem if options.kind == 'history' else options.kind}.png")
     if options.kind != "movie":
         claim(out, PICTURES)
     if sample and (options.regions or options.chains):
@@ -137,7 +140,8 @@ def draw(options):
     elif options.kind == "movie":
         draw_movie(runs[0], options)
     elif options.kind == "history":
-        save(draw_history(runs, options.columns.split(","), options.against, options.mean), out)
+        columns = options.columns or (HISTORY if options.table == "history.csv" else "")
+        save(draw_history(runs, columns.split(",") if columns else None, options.against, options.mean, options.table), out)
     elif options.kind == "profile":
         save(draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean), out)
     else:

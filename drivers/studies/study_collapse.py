@@ -20,6 +20,8 @@ from study_support import (OneLineParser, claimed, draw_disks, lattice, plt, rea
                            whole, write_csv, write_hdf5)
 from whole_file import save_figure
 
+from gravier.heaps import ends
+
 STEP = 5.0e-4  # s
 # radii [m], grains of a column, aspect ratios aimed at, flat columns below the one and tall ones above the other measured
 # ratio, time until the gate is taken away [s], times that a fall from the height of the column is waited for, width of the bins in
@@ -120,15 +122,9 @@ def length_of(centres, radii, wide, places=20):
     d, mean = centres.shape[1], radii.mean()
     place = centres[:, 0] if d == 2 else np.hypot(centres[:, 0], centres[:, 1])
     unit = {2: np.pi, 3: 4.0 / 3.0 * np.pi}[d]
-    ends = []
-    for first in np.arange(places) / places * wide * mean:
-        bins = np.arange(first, place.max() + 3.0 * wide * mean, wide * mean)
-        ground = np.diff(bins) if d == 2 else np.pi * np.diff(bins**2)
-        thickness = np.histogram(place, bins, weights=unit * radii**d)[0] / ground
-        # a ring about the axis that has no room for some grains may be empty in the middle of a heap
-        thickness[bins[:-1] < (4.0 * mean if d == 3 else 0.0)] = np.inf
-        ends.append(bins[np.flatnonzero(thickness < unit * mean**d / (2.0 * mean)**(d - 1))[0]])
-    return np.mean(ends)
+    # a ring about the axis that has no room for some grains may be empty in the middle of a heap
+    return np.mean(ends(place, unit * radii**d, (lambda x: x) if d == 2 else (lambda r: np.pi * r**2), unit * mean**d / (2.0 * mean)**(d - 1),
+                        (wide * mean, places, 4.0 * mean if d == 3 else 0.0)))
 
 
 def accepted(dimension, columns, chosen, slopes):

@@ -1,5 +1,4 @@
 """What the studies and the scenes share: loose grains, bodies files, runs of the program, pictures of disks."""
-import csv
 import os
 import platform
 import shutil
@@ -16,6 +15,7 @@ try:
 
     import gravier
     from gravier.case import ENVIRONMENT
+    from gravier.tables import write_table as write_csv
 except ImportError as missing:
     sys.exit(f"{Path(sys.argv[0]).name}: {missing}; expected a python3 with h5py, numpy and matplotlib")
 matplotlib.use("Agg")
@@ -178,16 +178,6 @@ def states(path):
     with h5py.File(path) as file:
         for name in sorted(file["steps"], key=int):
             yield int(name), float(file[f"steps/{name}"].attrs["time"]), file[f"steps/{name}"]
-
-
-def write_csv(path, columns):
-    """{column: values} as a table."""
-    names = list(columns)
-    with whole_file(path) as part, open(part, "w", encoding="ascii", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(names)
-        table.writerows([f"{value:.6g}" if isinstance(value, (float, np.floating)) else value for value in row]
-                        for row in zip(*[columns[name] for name in names]))
 
 
 def write_measured(path, columns):

@@ -255,6 +255,8 @@ contains
       self%physics%gravity(:) = config%gravity
       self%physics%body_force(:) = config%body_force
       self%physics%rotation = config%rotation
+      self%physics%resists(1) = scene%effects%rolling
+      self%physics%resists(2) = scene%effects%pivoting
       self%physics%laws = scene%laws
       self%physics%h = self%config%time%step
       self%physics%theta = self%config%time%theta

@@ -238,6 +238,72 @@ class Diagnostics(RunTestCase):
         np.testing.assert_allclose(history["dissipated_friction"][-1], MASS * 0.25 * G * way, rtol=1e-11)
         np.testing.assert_array_equal(history["sliding_fraction"], 1.0)
 
+    def thrown(self, title, row, scene, dimension=2):
+        """A grain of radius RADIUS on a floor, with `row` of velocities of the bodies file, over 0.1 s; names of its diagnostics are those of history.csv."""
+        axes = "xyz"[:dimension]
+        path = write(self.here(f"{title}.csv"), f"id,radius,mass,{','.join(axes)},{','.join(row)}\n1,{RADIUS!r},{MASS!r},{'0.0,' * (dimension - 1)}{RADIUS!r},"
+                     + ",".join(repr(value) for value in row.values()) + "\n")
+        case = {"scene": {"dimension": dimension, "bodies": "file", "bodies_file": path, **scene}, "time": {"step": 1e-3, "steps": 100},
+                "solver": {"tolerance": 1e-13, "max_iterations": 100000}}
+        history = self.run_here(title, merged(case, ALL), [plane("floor", dimension - 1, 1, 0.0)]).history()
+        self.check_balance(history)
+        return history
+
+    def test_dissipation_of_rolling(self):
+        """A disk that rolls without sliding loses mu_r m g x to rolling, one that slides without turning mu m g x to sliding, and one that does both the
+        works of friction along its slip and of the moment along its turn. A sphere that spins about the normal loses to pivoting. The parts sum up to
+        the dissipation of friction; without resistance there are none."""
+        time, weight = 1e-3 * np.arange(1, 101), MASS * G
+        parts = ("dissipated_sliding", "dissipated_rolling")
+        # rolls: a moment of mu_r m g R slows down m + I/R^2 = 3 m/2
+        rolls = self.thrown("rolls", {"vx": 1.0, "omega": -1.0 / RADIUS}, {"friction": 0.8, "rolling_friction": 0.1})
+        way = time - 0.5 * (2.0 / 3.0) * 0.1 * G * time**2
+        np.testing.assert_allclose(rolls["dissipated_rolling"], 0.1 * weight * way, rtol=1e-9)
+        self.assertLess(np.abs(rolls["dissipated_sliding"]).max(), 1e-9 * rolls["dissipated_rolling"][-1])
+        # slides: the moment holds the disk
+        slides = self.thrown("slides", {"vx": 1.0}, {"friction": 0.1, "rolling_friction": 0.2})
+        way = time - 0.5 * 0.1 * G * time**2
+        np.testing.assert_allclose(slides["dissipated_sliding"], 0.1 * weight * way, rtol=1e-9)
+        self.assertLess(np.abs(slides["dissipated_rolling"]).max(), 1e-9 * slides["dissipated_sliding"][-1])
+        # both: the rest of the moment turns it, I = m R^2/2
+        both = self.thrown("both", {"vx": 1.0}, {"friction": 0.1, "rolling_friction": 0.05})
+        turn = 0.05 * G * time**2
+        np.testing.assert_allclose(both["dissipated_rolling"], 0.05 * weight * turn, rtol=1e-9)
+        np.testing.assert_allclose(both["dissipated_sliding"], 0.1 * weight * (way - turn), rtol=1e-9)
+        for history in (rolls, slides, both):
+            np.testing.assert_allclose(sum(history[name] for name in parts), history["dissipated_friction"], rtol=1e-14)
+            self.assertNotIn("dissipated_pivoting", history)
+        # spins about the normal, I = 2 m R^2/5, while it rolls along x at the same time
+        both = self.thrown("spins", {"vx": 1.0, "wy": 1.0 / RADIUS, "wz": 300.0}, {"friction": 0.8, "rolling_friction": 0.1, "pivoting_friction": 0.05}, 3)
+        np.testing.assert_allclose(both["dissipated_pivoting"], 0.05 * weight * RADIUS * (300.0 * time - 0.5 * 2.5 * 0.05 * G / RADIUS * time**2), rtol=1e-9)
+        np.testing.assert_allclose(both["dissipated_rolling"], 0.1 * weight * (time - 0.5 * 0.1 * G / 1.4 * time**2), rtol=1e-9)
+        self.assertLess(np.abs(both["dissipated_sliding"]).max(), 1e-9 * both["dissipated_rolling"][-1])
+        self.assertNotIn("dissipated_pivoting", self.thrown("no pivoting", {"vx": 1.0}, {"friction": 0.1, "rolling_friction": 0.2}, 3))
+        for name in parts:
+            self.assertNotIn(name, self.thrown("no resistance", {"vx": 1.0}, {"friction": 0.1}))
+
+    def test_dissipation_of_many(self):
+        """The parts of stirred grains sum up to the whole on one and two ranks, with the same bits, and over a restart."""
+        for dimension in (2, 3):
+            case, boundaries = self.stirred(dimension, rolling_friction=0.1, pivoting_friction=0.05 * (dimension - 2))
+            case = merged(case, ALL, {"time": {"steps": 100}, "output": {"every": 100, "checkpoint_every": 60}})
+            one, two = (self.run_here(f"many {dimension} {ranks}", case, boundaries, ranks) for ranks in (1, 2))
+            history = one.history()
+            self.check_balance(history)
+            names = ["dissipated_sliding", "dissipated_rolling", "dissipated_pivoting"][:dimension]
+            scale = np.abs(history["dissipated_friction"]).max()
+            np.testing.assert_allclose(sum(history[name] for name in names), history["dissipated_friction"], rtol=0.0, atol=1e-14 * scale)
+            # moments take, but in steps in which a grain is struck: the velocity before it may lie along the impulse
+            for name in names[1:]:
+                self.assertGreater(history[name][-1], 1e-3 * scale)
+                self.assertGreater(np.mean(np.diff(history[name]) > -1e-3 * scale), 0.9, name)
+            first = merged(case, {"time": {"steps": 60}, "output": {"checkpoint_every": 60}})
+            self.run_here(f"part {dimension}", first, boundaries)
+            rest = self.run_here(f"part {dimension}", case, boundaries, options=("--restart",))
+            for name in ("dissipated_friction", *names):
+                np.testing.assert_array_equal(two.history()[name], history[name])
+                np.testing.assert_array_equal(rest.history()[name], history[name])
+
     def test_work_of_a_belt(self):
         """A disk laid upon a belt: the belt does m mu g v t, the disk takes half of m (mu g t)^2, slip takes the rest."""
         path = grains_csv(self.here("belt.csv"), [[0.0, RADIUS]])

@@ -10,14 +10,18 @@ from . import blocks
 from .arrays import StaleArray
 from .case import CaseError, entries, namelist, parse_namelist, run, value_text
 from .checksum import seal
+from .heaps import heap
 from .library import SimulationError
+from .mixing import mixing
 from .restarts import write_bodies
 from .results import BodiesFile, Run
 from .rough_walls import rough_walls
 from .shapes import Piece, Shape
 from .simulation import Simulation
 from .studies import study
-from .tables import ResultsError, Table, read_table
+from .tables import ResultsError, Table, read_table, write_table
+from .wall_tests import wall_test
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "entries", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text", "write_bodies"]
+           "entries", "heap", "mixing", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text", "wall_test",
+           "write_bodies", "write_table"]

@@ -352,12 +352,16 @@ class Run:
             body, contact, arm = self._arms(step, bodies, contacts)
             sign = np.where(bodies.id[body] == contacts.candidate[contact], -1.0, 1.0)
             total = np.bincount(body, sign * force[contact] * (arm * contacts.normal[contact]).sum(axis=1), len(bodies))
-            volume = np.array([shape.volume for shape in [ball(self.dimension), *self.shapes()]])[bodies.shape]
-            return total / (self.dimension * volume * bodies.radius**self.dimension)
+            return total / (self.dimension * self.volumes(bodies))
         total = np.bincount(row, force, len(bodies))
         total += np.bincount(other[other >= 0], force[other >= 0], len(bodies))
-        volume = np.pi * bodies.radius**2 if self.dimension == 2 else 4.0 / 3.0 * np.pi * bodies.radius**3
-        return bodies.radius * total / (self.dimension * volume)
+        return bodies.radius * total / (self.dimension * self.volumes(bodies))
+
+    def volumes(self, bodies):
+        """Volume, in the plane area, of each body of a table of them (n)."""
+        shapes = [ball(self.dimension), *(self.shapes() if "shape" in bodies else [])]
+        number = bodies.shape if len(shapes) > 1 else np.zeros(len(bodies), dtype=int)
+        return np.array([shape.volume for shape in shapes])[number] * bodies.radius**self.dimension
 
     def subdomain(self, step=None):
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""

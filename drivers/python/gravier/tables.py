@@ -2,6 +2,7 @@
 import csv
 
 import numpy as np
+from whole_file import whole_file
 
 
 class ResultsError(Exception):
@@ -75,6 +76,15 @@ def read_table(path, columns=()):
         if name not in header:
             raise ResultsError(f"{path}: no column {name}; expected a table that a run wrote")
     return Table({name: values[:, k] for k, name in enumerate(header)})
+
+
+def write_table(path, columns, digits=6):
+    """Columns by name as a CSV file with one row of names."""
+    with whole_file(path) as part, open(part, "w", encoding="ascii", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(columns)
+        table.writerows([f"{value:.{digits}g}" if isinstance(value, (float, np.floating)) else value for value in row]
+                        for row in zip(*columns.values()))
 
 
 def one_line(reason):

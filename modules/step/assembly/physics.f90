@@ -19,8 +19,8 @@ module gravier_physics
     type(law_set_t) :: laws
     !> the step is the first of the run
     logical :: first = .false.
-    !> grains turn
-    logical :: rotation = .true.
+    !> grains turn; moments resist their rolling or pivoting; they resist pivoting
+    logical :: rotation = .true., resists(2) = .false.
     !> step [s]; weight of the new velocity in the places
     real(dp) :: h = 1.0_dp, theta = 0.5_dp
     !> motion of the periodic cell in this step, without contacts until it is solved

@@ -30,11 +30,12 @@ module gravier_energy_balance
     !> moves, and by the forces of the user on the others
     real(dp) :: load_work = 0.0_dp, boundary_work = 0.0_dp
     !> where contacts are compliant: of their springs along the normals and along the tangents; that at the start, and whether it is
-    !> known
+    !> known. Whether moments resist rolling, and pivoting
     real(dp), private :: elastic(2) = 0.0_dp, elastic_start = 0.0_dp
-    logical, private :: has_springs = .false., knows_springs = .false.
-    !> in contacts, by the normal and by the tangential impulses; what springs store is not among it
-    real(dp) :: dissipated_normal = 0.0_dp, dissipated_friction = 0.0_dp
+    logical, private :: has_springs = .false., knows_springs = .false., resists(2) = .false.
+    !> in contacts, by the normal and by the tangential impulses, and of these by moments against rolling and against pivoting; what
+    !> springs store is not among it
+    real(dp) :: dissipated_normal = 0.0_dp, dissipated_friction = 0.0_dp, dissipated_moments(2) = 0.0_dp
     !> kinetic energy of grains and boundaries that were taken out of the scene
     real(dp) :: carried_away = 0.0_dp
   contains
@@ -50,13 +51,13 @@ module gravier_energy_balance
   end type energy_balance_t
 
   !> words of the state of a balance
-  integer, parameter :: energy_words = 13
+  integer, parameter :: energy_words = 15
   !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: energy_record = "translation rotation boundaries potential start load_work boundary_work "// &
-    & "dissipated_normal dissipated_friction carried_away elastic elastic_start"
+    & "dissipated_normal dissipated_friction carried_away elastic elastic_start dissipated_rolling dissipated_pivoting"
   !> places among the sums of a step
   integer, parameter :: in_translation = 1, in_rotation = 2, in_start = 3, in_load = 4, in_normal = 5, in_friction = 6, &
-    & in_boundary = 7, in_springs = 7, n_sums = 11
+    & in_boundary = 7, in_springs = 7, in_rolling = 12, in_pivoting = 13, n_sums = 13
 
 contains
 
@@ -83,6 +84,11 @@ contains
     call list%add("boundary_work", self%boundary_work)
     call list%add("dissipated_normal", self%dissipated_normal)
     call list%add("dissipated_friction", self%dissipated_friction)
+    if (self%resists(1)) then
+      call list%add("dissipated_sliding", self%dissipated_friction - sum(self%dissipated_moments))
+      call list%add("dissipated_rolling", self%dissipated_moments(1))
+      if (self%resists(2)) call list%add("dissipated_pivoting", self%dissipated_moments(2))
+    end if
     call list%add("carried_away", self%carried_away)
     call list%add("energy_error", self%error())
   end subroutine energy_columns
@@ -96,6 +102,7 @@ contains
     integer :: s, k, b
 
     self%has_springs = physics%laws%yields
+    self%resists(:) = physics%resists
     self%knows_springs = .false.
     self%elastic(:) = 0.0_dp
     self%elastic_start = 0.0_dp
@@ -103,6 +110,7 @@ contains
     self%boundary_work = 0.0_dp
     self%dissipated_normal = 0.0_dp
     self%dissipated_friction = 0.0_dp
+    self%dissipated_moments(:) = 0.0_dp
     self%carried_away = 0.0_dp
     parts(:, :) = 0.0_dp
     do s = 1, size(decomposition%owned)
@@ -182,6 +190,7 @@ contains
     self%load_work = self%load_work + sums(in_load)
     self%dissipated_normal = self%dissipated_normal + sums(in_normal)
     self%dissipated_friction = self%dissipated_friction + sums(in_friction)
+    self%dissipated_moments(:) = self%dissipated_moments + sums(in_rolling:in_pivoting)
     self%boundary_work = self%boundary_work + sums(in_boundary)
     if (self%has_springs) call take_springs(self, sums(in_springs + 1:in_springs + 2), sums(in_springs + 3:in_springs + 4))
     call take_boundaries(self, step%decomposition%boundaries, step%boundary_impulses)
@@ -237,7 +246,7 @@ contains
     integer, intent(in) :: s
     real(dp), intent(inout) :: part(n_sums)
     real(dp), allocatable :: mean(:, :), v(:, :, :)
-    integer :: c, q, g
+    integer :: c, q, g, last
 
     associate (sub => step%problem%sub(s), kernels => step%problem%kernels)
       allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
@@ -250,6 +259,12 @@ contains
         if (step%problem%cell%moves) call add_cell_work(c)
         part(in_normal) = part(in_normal) - sub%normal_impulse(c)*v(q, 1, g)
         part(in_friction) = part(in_friction) - sum(sub%impulse(q, 2:, g)*v(q, 2:, g))
+        if (kernels%rolling_row > 0) then
+          ! in space about t and s, and last about the normal
+          last = kernels%nf + kernels%nd - 1
+          part(in_rolling) = part(in_rolling) - sum(sub%impulse(q, kernels%nf + 1:last, g)*v(q, kernels%nf + 1:last, g))
+          part(in_pivoting) = part(in_pivoting) - sum(sub%impulse(q, last + 1:, g)*v(q, last + 1:, g))
+        end if
         if (any(sub%pair(:, c) > sub%n_grains)) call add_boundary_work(c)
       end do
     end associate
@@ -398,37 +413,28 @@ contains
     self%boundaries = after
   end subroutine take_boundaries
 
-  !> Measure what depends on the places of the end of the step. Collective.
+  !> Measure the potential energy in the places that grains have at the end of the step, -(m g + f V) . x. Collective.
   subroutine energy_measure(self, step)
     class(energy_balance_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
-    call take_places(self, step%decomposition, step%physics)
-  end subroutine energy_measure
-
-  !> Potential energy in the places that grains have now, -(m g + f V) . x. Collective.
-  subroutine take_places(self, decomposition, physics)
-    type(energy_balance_t), intent(inout) :: self
-    type(decomposition_t), intent(in) :: decomposition
-    type(physics_t), intent(in) :: physics
-    real(dp) :: part(size(decomposition%owned)), x(decomposition%nd)
+    real(dp) :: part(size(step%decomposition%owned)), x(step%decomposition%nd)
     integer :: s, k, d
 
     part(:) = 0.0_dp
     do s = 1, size(part)
-      associate (owned => decomposition%owned(s))
+      associate (decomposition => step%decomposition, load => step%physics, owned => step%decomposition%owned(s))
         do k = 1, owned%n
           if (owned%glued(k) > 0) cycle
           x(:) = owned%position(:, k)
           if (owned%ni > 0) call decomposition%period%unwrap(owned%image(:, k), x)
           do d = 1, owned%nd
-            part(s) = part(s) - (owned%mass(k)*physics%gravity(d) &
-              & + decomposition%figures%volume_of(owned, k)*physics%body_force(d))*x(d)
+            part(s) = part(s) - (owned%mass(k)*load%gravity(d) + decomposition%figures%volume_of(owned, k)*load%body_force(d))*x(d)
           end do
         end do
       end associate
     end do
-    self%potential = decomposition%comm%sum_real(part)
-  end subroutine take_places
+    self%potential = step%decomposition%comm%sum_real(part)
+  end subroutine energy_measure
 
   !> What the balance lacks since the start [J]: rounding, and what was taken from grains that stand still (gravier_sleeping).
   pure real(dp) function energy_error(self) result(error)
@@ -464,6 +470,8 @@ contains
     words(11) = transfer(self%elastic(1), 0_i8)
     words(12) = transfer(self%elastic(2), 0_i8)
     words(13) = transfer(self%elastic_start, 0_i8)
+    words(14) = transfer(self%dissipated_moments(1), 0_i8)
+    words(15) = transfer(self%dissipated_moments(2), 0_i8)
   end subroutine energy_get_state
 
   pure subroutine energy_set_state(self, words)
@@ -484,6 +492,8 @@ contains
     self%elastic(1) = transfer(words(11), 0.0_dp)
     self%elastic(2) = transfer(words(12), 0.0_dp)
     self%elastic_start = transfer(words(13), 0.0_dp)
+    self%dissipated_moments(1) = transfer(words(14), 0.0_dp)
+    self%dissipated_moments(2) = transfer(words(15), 0.0_dp)
     self%knows_springs = .true.
   end subroutine energy_set_state
 

@@ -438,16 +438,20 @@ contains
   !> A balance goes on from its state, bit for bit.
   subroutine check_state(energy)
     type(energy_balance_t), intent(in) :: energy
-    type(energy_balance_t) :: other
-    integer(i8) :: words(13), again(13)
+    type(energy_balance_t) :: one, other
+    integer(i8) :: words(15), again(15)
 
-    call energy%get_state(words)
+    one = energy
+    one%dissipated_moments(:) = [0.25_dp, 0.125_dp]
+    call one%get_state(words)
     call other%set_state(words)
     call other%get_state(again)
     call check(all(words == again), "state of a balance")
     call check_close(other%error(), energy%error(), 0.0_dp, "its error")
     call check_close(other%turnover(), energy%turnover(), 0.0_dp, "its turnover")
     call check_close(other%potential, energy%potential, 0.0_dp, "its potential")
+    call check_close(other%dissipated_moments(1), 0.25_dp, 0.0_dp, "what was lost to rolling")
+    call check_close(other%dissipated_moments(2), 0.125_dp, 0.0_dp, "what was lost to pivoting")
   end subroutine check_state
 
   !> A grain of group 1 turns with a boundary about the origin at 2 rad/s; a free disk of 1 kg lies above it, at rest and without

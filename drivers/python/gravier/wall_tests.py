@@ -1,0 +1,102 @@
+"""Strains, void ratio and strength of a sample between walls: biaxial and triaxial tests, oedometers."""
+import numpy as np
+
+from .tables import ResultsError, Table
+
+#: a normal whose component is above this lies along an axis
+ALONG = 0.99
+
+
+def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
+    """Measures of a test whose sample lies between planes, from history.csv with boundary_forces = .true.: a row of means of `mean` steps after
+    each other, with step, time, axial_strain, lateral_strain_x, ..., volumetric_strain, void_ratio, solid_fraction, axial_stress, lateral_stress,
+    stress_ratio and sin_phi.
+
+    `axial` is the axis of the load, the last one unless told, `lateral` the axes, such as "x", whose mean stress it is compared with, all others unless
+    told. Strains are shortenings over the sizes at the end of the first step after the time `since` [s]; earlier rows are left out. Along periodic axes
+    the period is the size. Stresses are those of the columns `stress_xx`, ... where history.csv has them, else forces on planes over their areas; along a
+    periodic axis they need the columns."""
+    axes = "xyz"[:run.dimension]
+    axial, lateral = _chosen_axes(axes, axial, lateral)
+    if not isinstance(mean, (int, np.integer)) or mean < 1:
+        raise ResultsError(f"mean {mean!r}: expected a whole number of steps above 0")
+    history = run.history()
+    history = Table({name: values[history.time > since] for name, values in history.items()})
+    planes = {axis: _planes(run, history, axis) for axis in axes}
+    rows = _with_sizes(run, history, planes)
+    if len(rows) < mean:
+        raise ResultsError(f"{run.directory}/history.csv: {len(rows)} steps after {since:g} s; expected {mean} at least")
+    start = {axis: rows[f"size_{axis}"][0] for axis in axes}
+    volume = _solid_volume(run, history)
+    rows = rows.means(int(mean))
+    size = {axis: rows[f"size_{axis}"] for axis in axes}
+    found = {"step": rows.step, "time": rows.time, "axial_strain": 1.0 - size[axial] / start[axial]}
+    found.update({f"lateral_strain_{axis}": 1.0 - size[axis] / start[axis] for axis in axes if axis != axial})
+    box = np.prod([size[axis] for axis in axes], axis=0)
+    found["volumetric_strain"] = 1.0 - box / np.prod(list(start.values()))
+    found["void_ratio"], found["solid_fraction"] = box / volume - 1.0, volume / box
+    found["axial_stress"] = rows[f"stress_{axial}"]
+    found["lateral_stress"] = np.mean([rows[f"stress_{axis}"] for axis in lateral], axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found["stress_ratio"] = found["axial_stress"] / found["lateral_stress"]
+        found["sin_phi"] = (found["axial_stress"] - found["lateral_stress"]) / (found["axial_stress"] + found["lateral_stress"])
+    return Table(found)
+
+
+def stresses_from(run):
+    """Where the stresses of wall_test come from, in words."""
+    return "means over the contacts" if "stress_xx" in run.history() else "forces on planes"
+
+
+def _chosen_axes(axes, axial, lateral):
+    axial = axes[-1] if axial is None else axial
+    lateral = [axis for axis in axes if axis != axial] if lateral is None else list(lateral)
+    if axial not in tuple(axes) or not lateral or len(set(lateral)) < len(lateral) or not set(lateral) <= set(axes) - {axial}:
+        raise ResultsError(f"axial {axial!r}, lateral {''.join(lateral)!r}: expected one of {', '.join(axes)} and others of them")
+    return axial, lateral
+
+
+def _planes(run, history, axis):
+    """The names of the planes below and above along an axis, as in history.csv; None where the axis is periodic."""
+    number = "xyz".index(axis)
+    if run.period[number] > 0.0:
+        return None
+    rows, found = run.boundaries(), []
+    removed = [group.get("name") for group in run.case.get("boundary", []) if "remove_at" in group]
+    for sign in (1.0, -1.0):
+        names = [name.replace(",", "_").replace('"', "_") for name, shape, normal in zip(rows.name, rows.shape, rows.normal)
+                 if shape == "plane" and sign * normal[number] > ALONG and name not in removed]
+        if len(names) != 1:
+            side = f"{'-' if sign > 0.0 else '+'}{axis}"
+            raise ResultsError(f"{run.path}: {len(names)} planes on the side {side}{': ' if names else ''}{', '.join(names)}; expected one on each side, or a period")
+        if f"position_{axis}:{names[0]}" not in history:
+            raise ResultsError(f"{run.directory}/history.csv: no column position_{axis}:{names[0]}; &output boundary_forces = .true. writes it")
+        found.append(names[0])
+    return found
+
+
+def _with_sizes(run, history, planes):
+    """Sizes of the box and normal stresses along the axes in each step, compression positive."""
+    rows = Table(step=history.step, time=history.time)
+    for number, (axis, names) in enumerate(planes.items()):
+        if names is None:
+            rows[f"size_{axis}"] = run.period[number] * np.exp(history.get(f"cell_strain_{axis}", np.zeros(len(rows))))
+        else:
+            rows[f"size_{axis}"] = history[f"position_{axis}:{names[1]}"] - history[f"position_{axis}:{names[0]}"]
+    for axis, names in planes.items():
+        if f"stress_{axis}{axis}" in history:
+            rows[f"stress_{axis}"] = history[f"stress_{axis}{axis}"]
+        elif names is None:
+            raise ResultsError(f"{run.directory}/history.csv: no column stress_{axis}{axis}, which a periodic axis needs; &output stress = .true. writes it")
+        else:
+            area = np.prod([rows[f"size_{other}"] for other in planes if other != axis], axis=0)
+            rows[f"stress_{axis}"] = 0.5 * (history[f"force_{axis}:{names[1]}"] - history[f"force_{axis}:{names[0]}"]) / area
+    return rows
+
+
+def _solid_volume(run, history):
+    """Of all grains, which have to be the same in all steps [m³, m²]."""
+    if np.any(history.grains != history.grains[0]):
+        raise ResultsError(f"{run.directory}/history.csv: {history.grains.min():g} to {history.grains.max():g} grains; expected a test in which no grain "
+                           "enters or leaves")
+    return float(np.sum(run.volumes(run.bodies())))

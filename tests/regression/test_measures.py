@@ -1,0 +1,352 @@
+"""Measures of states: mixing, heaps and tests between walls, of states whose values are known, with single grains astray, and of runs."""
+import os
+import sys
+import unittest
+
+import matplotlib
+import numpy as np
+
+from forked_scripts import script
+from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
+import gravier
+from gravier.mixing import lacey
+
+matplotlib.use("Agg")
+sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
+from curve_pictures import draw_history  # noqa: E402
+
+R = 0.01
+
+
+class States(gravier.Run):
+    """States of grains as a run has them: positions, and radii R unless told."""
+
+    def __init__(self, *states, radius=None, period=None):
+        self.path, self.dimension = "states", len(states[0][0])
+        self.period = np.zeros(self.dimension) if period is None else np.array(period)
+        self.steps, self.times = np.arange(len(states)), 0.1 * np.arange(len(states))
+        self.case = {"material": [{"name": "sand"}, {"name": "steel"}]}
+        self.states = [gravier.Table(id=np.arange(1, len(state) + 1), position=np.array(state, dtype=float),
+                                     radius=np.full(len(state), R) if radius is None else np.resize(radius, len(state))) for state in states]
+
+    def bodies(self, step=None):
+        return self.states[-1 if step is None else step]
+
+    def shapes(self):
+        return []
+
+
+def grid(*counts):
+    """Centres of touching grains on a square lattice in the corner of the axes, the last axis the slowest."""
+    return R * (2.0 * np.stack(np.meshgrid(*(np.arange(count) for count in counts[::-1]), indexing="ij"), axis=-1).reshape(-1, len(counts))[:, ::-1] + 1.0)
+
+
+class Mixing(unittest.TestCase):
+
+    def test_separate_and_mixed(self):
+        """Lacey's index of cells that hold one kind each is 0, of equal shares above 1 by what chance lacks, of random places 1 in the mean."""
+        number = np.repeat(np.arange(20), 25)
+        self.assertAlmostEqual(lacey(number, number < 7), 0.0, places=12)
+        even = np.arange(500) % 5 < 2
+        self.assertAlmostEqual(lacey(number, even), 1.0 / (1.0 - 19.0 / 499.0), places=12)
+        # kinds dealt out at random, also where cells have 1 to 60 grains; 400 trials know the mean to a twentieth of their deviation
+        rng = np.random.default_rng(7)
+        for cells in (number, np.repeat(np.arange(20), np.linspace(1, 60, 20).astype(int))):
+            found = [lacey(cells, rng.permutation(np.arange(len(cells)) % 5 < 2)) for _ in range(400)]
+            self.assertAlmostEqual(np.mean(found), 1.0, delta=4.0 * np.std(found) / 20.0)
+            self.assertLess(np.std(found), 0.05)
+        self.assertTrue(np.isnan(lacey(np.zeros(9, int), np.arange(9) < 4)))
+        self.assertTrue(np.isnan(lacey(np.arange(9), np.arange(9) < 4)))
+
+    def test_halves_of_a_bed(self):
+        """The upper half of a bed is told by its places in the first state, and ends below; the heights are those of the halves."""
+        bed = grid(20, 20)
+        mirrored = bed * [1.0, -1.0] + [0.0, 40.0 * R]
+        mixed = bed[np.random.default_rng(3).permutation(400)]
+        table = gravier.mixing(States(bed, mirrored, mixed), by="y", cell=10.0 * R)
+        np.testing.assert_allclose(table.segregation[:2], [1.0, -1.0], rtol=1e-12)
+        np.testing.assert_allclose(table.height_difference[:2], [20.0 * R, -20.0 * R], rtol=1e-12)
+        self.assertLess(abs(table.segregation[2]), 0.2)
+        np.testing.assert_array_equal([table.share, table.grains, table.cells], [[0.5] * 3, [400] * 3, [16] * 3])
+        np.testing.assert_allclose(table.mixing[:2], 0.0, atol=1e-12)
+        self.assertGreater(table.mixing[2], 0.9)
+        self.assertEqual(len(gravier.mixing(States(bed, mirrored, mixed), by="y", since=0.15)), 1)
+
+    def test_sizes_and_materials(self):
+        """Large grains under small ones have -1, by volume; the same kinds by material."""
+        radius = np.array([2.0 * R] * 50 + [R] * 200)
+        place = np.concatenate([2.0 * grid(10, 5), grid(20, 10) + [0.0, 20.0 * R]])
+        run = States(place, radius=radius)
+        table = gravier.mixing(run)
+        self.assertAlmostEqual(table.segregation[0], -1.0, places=12)
+        self.assertAlmostEqual(table.height_difference[0], -20.0 * R, places=12)
+        self.assertEqual(table.share[0], 0.2)
+        run.states[0]["material"] = np.where(radius > R, 2, 1)
+        for value in (None, 2, "2", "steel"):
+            self.assertEqual(gravier.mixing(run, by="material", value=value).segregation[0], table.segregation[0])
+        self.assertAlmostEqual(gravier.mixing(run, by="material", value="sand").segregation[0], 1.0, places=12)
+
+    def test_stray_grain(self):
+        """One grain of 400 that flies away changes nothing that matters."""
+        bed = grid(20, 20)
+        away = np.concatenate([bed[:-1], [[3.0, 50.0]]])
+        table = gravier.mixing(States(bed, away), by="y", cell=10.0 * R)
+        self.assertAlmostEqual(table.segregation[1], 1.0, delta=0.01)
+        self.assertAlmostEqual(table.height_difference[1], 20.0 * R, delta=0.1 * R)
+        self.assertAlmostEqual(table.mixing[1], 0.0, delta=0.01)
+
+    def test_refusals(self):
+        run = States(grid(4, 4))
+        for words, options in (("no written state has grains of both kinds by size", {}), ("by 'q': expected one of size, material, x, y", {"by": "q"}),
+                               ("material 'gold'; expected one of sand, steel", {"by": "material", "value": "gold"}),
+                               ("cell -1: expected a length above 0", {"by": "x", "cell": -1}), ("x 'a': expected a number", {"by": "x", "value": "a"}),
+                               ("no written state from 3 s on; expected a time of at most 0 s", {"by": "x", "since": 3.0})):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.mixing(run, **options)
+
+
+def wedge(degrees, half, dimension=2):
+    """Grains of a lattice below the flanks of a wedge, or of a cone, of a slope and half a width."""
+    high = half * np.tan(np.radians(degrees))
+    count, rows = int(half / R) + 2, int(high / (2.0 * R)) + 2
+    place = grid(*([2 * count] * (dimension - 1)), rows) - np.append(np.full(dimension - 1, 2.0 * count * R), 0.0)
+    out = np.abs(place[:, 0]) if dimension == 2 else np.linalg.norm(place[:, :-1], axis=1)
+    return place[place[:, -1] + R < high * (1.0 - out / half) + R]
+
+
+#: far along the floor, thrown up, fallen under the floor, and in flight over a flank
+ASTRAY = [[90.0, R], [0.0, 7.0], [0.3, -4.0], [0.25, 0.6]]
+
+
+class Heaps(unittest.TestCase):
+
+    def test_wedge(self):
+        """Height, fronts and slopes of wedges, whatever their place, with and without grains that have gone astray."""
+        for degrees in (15.0, 30.0, 44.0):
+            with self.subTest(degrees=degrees):
+                place = wedge(degrees, 1.0)
+                found = gravier.heap(States(place, place + [0.37, 0.0], np.concatenate([place, ASTRAY])))
+                high = place[:, 1].max() + R
+                np.testing.assert_allclose(found.height, high, rtol=1e-12)
+                # the last columns of a lattice are no full row beside each other
+                last = np.abs(place[:, 0]).max() + R
+                np.testing.assert_allclose(found.front_high - [0.0, 0.37, 0.0], last, atol=2.0 * R)
+                np.testing.assert_allclose(found.front_low - [0.0, 0.37, 0.0], -last, atol=2.0 * R)
+                np.testing.assert_allclose(found.length, found.front_high - found.front_low, rtol=1e-12)
+                self.assertLess(np.abs(found.run_out).max(), 2.0 * R)
+                # steps of a lattice, a diameter high in flanks of 13 rows and more
+                np.testing.assert_allclose(np.concatenate([found.angle_low, found.angle_high]), degrees, atol=1.5)
+                for name in found:
+                    if name not in ("step", "time"):
+                        self.assertAlmostEqual(found[name][2], found[name][0], delta=2.0 * R if "front" in name or name == "length" else 0.5, msg=name)
+
+    def test_column_that_collapses(self):
+        """A column has its width, no slopes, and no run-out; a wedge against a wall has one front, and the run-out of its length."""
+        column, place = grid(20, 60), wedge(25.0, 1.2)
+        found = gravier.heap(States(column, place[place[:, 0] > 0.0]))
+        np.testing.assert_allclose([found.height[0], found.front_low[0], found.front_high[0]], [120.0 * R, 0.0, 40.0 * R], atol=0.21 * R)
+        self.assertTrue(np.isnan([found.angle_low[0], found.angle_high[0], found.angle_low[1]]).all())
+        self.assertAlmostEqual(found.run_out[1], 1.2 / 0.4 - 1.0, delta=0.15)
+        self.assertAlmostEqual(found.angle_high[1], 25.0, delta=1.5)
+        self.assertEqual(found.run_out[0], 0.0)
+        later = gravier.heap(States(column, place[place[:, 0] > 0.0]), since=0.1)
+        np.testing.assert_array_equal([later.step, later.run_out], [[1], [0.0]])
+
+    def test_two_slopes(self):
+        """Flanks of two slopes are told apart, and shares of the height choose the part of a flank."""
+        left, right = wedge(20.0, 1.5), wedge(35.0, 1.5 * np.tan(np.radians(20.0)) / np.tan(np.radians(35.0)))
+        place = np.concatenate([left[left[:, 0] < 0.0], right[right[:, 0] > 0.0]])
+        found = gravier.heap(States(place))
+        self.assertAlmostEqual(found.angle_low[0], 20.0, delta=1.0)
+        self.assertAlmostEqual(found.angle_high[0], 35.0, delta=1.5)
+        # a steep top upon a flat foot
+        high = 1.5 * np.tan(np.radians(20.0))
+        bent = left[(left[:, 1] < 0.5 * high) | (np.abs(left[:, 0]) < (high - left[:, 1]) / np.tan(np.radians(40.0)))]
+        foot, top = gravier.heap(States(bent), shares=(0.1, 0.4)), gravier.heap(States(bent), shares=(0.55, 0.9))
+        self.assertAlmostEqual(foot.angle_high[0], 20.0, delta=2.5)
+        self.assertAlmostEqual(top.angle_high[0], 40.0, delta=4.0)
+
+    def test_space(self):
+        """A cone, and a wedge in a channel that is periodic across; single grains far away change nothing."""
+        cone = wedge(30.0, 0.5, 3) + [0.11, -0.07, 0.0]
+        found = gravier.heap(States(cone, np.concatenate([cone, [[70.0, 3.0, R], [0.0, 0.0, 9.0]]])))
+        self.assertNotIn("front_low", found)
+        np.testing.assert_allclose(found.angle, 30.0, atol=1.5)
+        np.testing.assert_allclose(found.length, 0.5, atol=4.0 * R)
+        np.testing.assert_allclose(found.height, cone[:, 2].max() + R, rtol=1e-12)
+        flat = wedge(25.0, 0.6)
+        for period in (None, [0.0, 8.0 * R, 0.0]):
+            channel = np.concatenate([np.insert(flat, 1, y, axis=1) for y in R * (2.0 * np.arange(4) + 1.0)])
+            found = gravier.heap(States(channel, period=period), along="x")
+            np.testing.assert_allclose([found.angle_low[0], found.angle_high[0]], 25.0, atol=1.5)
+            np.testing.assert_allclose([-found.front_low[0], found.front_high[0]], np.abs(flat[:, 0]).max(), atol=3.0 * R)
+
+    def test_refusals(self):
+        run = States(grid(3, 3))
+        for words, options in (("along 'y': expected x", {"along": "y"}), ("shares 0.8 and 0.2", {"shares": (0.8, 0.2)}), ("width 0: expected", {"width": 0.0})):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.heap(run, **options)
+        empty = States(grid(1, 1))
+        empty.states[0] = gravier.Table({name: values[:0] for name, values in empty.states[0].items()})
+        with self.assertRaisesRegex(gravier.ResultsError, "no written state has grains"):
+            gravier.heap(empty)
+
+
+class WallTests(RunTestCase):
+
+    def squeezed(self, name, dimension=2, boundaries=None, more=None):
+        """A grain between planes that forces press together, or those that are given."""
+        os.makedirs(self.here(name))
+        axes = "xyz"[:dimension]
+        write(self.here(name, "one.csv"), f"id,radius,mass,{','.join(axes)}\n1,{R},1.0,{','.join([str(R)] * dimension)}\n")
+        unit = np.eye(dimension)
+        planes = [{"name": f"low {axis}", "shape": "plane", "normal": list(unit[k])} for k, axis in enumerate(axes)]
+        planes += boundaries or [{"name": f"high {axis}", "shape": "plane", "point": list(2.0 * R * unit[k]), "normal": list(-unit[k]),
+                                  "free": [bool(entry) for entry in unit[k]], "pressure": pressure, "mass": 1.0}
+                                 for k, (axis, pressure) in enumerate(zip(axes, (1000.0, 2000.0, 3000.0)))]
+        output = {"directory": ".", "every": 1000, "boundary_forces": True, **(more or {})}
+        run = run_case({"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "file", "bodies_file": "one.csv"}, "boundary": planes,
+                        "time": {"step": 1e-3, "steps": 20}, "solver": {"accuracy": 1e-6}, "output": output}, 1, self.here(name))
+        self.assert_status(run, 0)
+        return gravier.Run(self.here(name))
+
+    def test_strength(self):
+        """A disk under 1000 N/m across and 2000 N/m from above has a ratio of 2 and sin phi = 1/3, a sphere that under 3000 Pa ratios of 2 and 3;
+        stresses are those of the walls and, where they are asked for, of the contacts."""
+        for stress in (False, True):
+            found = gravier.wall_test(self.squeezed(f"disk {stress}", more={"stress": stress}), mean=5)
+            self.assertEqual(list(found), ["step", "time", "axial_strain", "lateral_strain_x", "volumetric_strain", "void_ratio", "solid_fraction", "axial_stress",
+                                           "lateral_stress", "stress_ratio", "sin_phi"])
+            np.testing.assert_allclose(found.step, [3.0, 8.0, 13.0, 18.0])
+            for name, value in (("axial_stress", 2000.0), ("lateral_stress", 1000.0), ("stress_ratio", 2.0), ("sin_phi", 1.0 / 3.0), ("solid_fraction", np.pi / 4.0),
+                                ("void_ratio", 4.0 / np.pi - 1.0)):
+                np.testing.assert_allclose(found[name][-1], value, rtol=1e-6, err_msg=name)
+        run = self.squeezed("sphere", 3)
+        for options, ratio in (({}, 2.0), ({"lateral": "x"}, 3.0), ({"lateral": ["y"]}, 1.5), ({"axial": "x"}, 0.4)):
+            self.assertAlmostEqual(gravier.wall_test(run, **options).stress_ratio[-1], ratio, places=6)
+        self.assertAlmostEqual(gravier.wall_test(run).solid_fraction[-1], np.pi / 6.0, places=6)
+
+    def test_strains(self):
+        """A lid that comes down at 0.1 m/s and a side that goes out at 0.05 m/s: strains are those of their ways since the end of a step; old walls that
+        are removed at once do not count."""
+        sides = [{"name": "side", "shape": "plane", "point": [8.0 * R, 0.0], "normal": [-1.0, 0.0], "velocity": [0.05, 0.0]},
+                 {"name": "lid, of steel", "shape": "plane", "point": [0.0, 8.0 * R], "normal": [0.0, -1.0], "velocity": [0.0, -0.1]},
+                 {"name": "old", "shape": "plane", "point": [0.0, 9.0 * R], "normal": [0.0, -1.0], "remove_at": 0.0}]
+        run = self.squeezed("strains", boundaries=sides)
+        for since, first in ((0.0, 1), (0.0095, 10)):
+            found = gravier.wall_test(run, since=since)
+            time = 1e-3 * np.arange(first, 21)
+            wide, high = 8.0 * R + 0.05 * time, 8.0 * R - 0.1 * time
+            np.testing.assert_allclose(found.time, time, rtol=1e-9)
+            np.testing.assert_allclose(found.axial_strain, 1.0 - high / high[0], atol=1e-12)
+            np.testing.assert_allclose(found.lateral_strain_x, 1.0 - wide / wide[0], atol=1e-12)
+            np.testing.assert_allclose(found.volumetric_strain, 1.0 - wide * high / (wide * high)[0], atol=1e-12)
+            np.testing.assert_allclose(found.void_ratio, wide * high / (np.pi * R**2) - 1.0, rtol=1e-12)
+        for words, options in (("20 steps after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
+                               ("0 steps after 9 s", {"since": 9.0})):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.wall_test(run, **options)
+        with self.assertRaisesRegex(gravier.ResultsError, r"no column position_x:low x; &output boundary_forces"):
+            gravier.wall_test(self.squeezed("no forces", more={"boundary_forces": False}))
+        sides[2].pop("remove_at")
+        with self.assertRaisesRegex(gravier.ResultsError, r"2 planes on the side \+y: lid_ of steel, old; expected one on each side"):
+            gravier.wall_test(self.squeezed("two lids", boundaries=sides))
+
+    def test_periodic(self):
+        """A cell that is periodic across: its size is the period, and stresses need those of the contacts."""
+        os.makedirs(self.here("cell"))
+        write(self.here("cell", "one.csv"), f"id,radius,mass,x,y\n1,{R},1.0,{R},{R}\n")
+        case = {"scene": {"dimension": 2, "gravity": [0.0, 0.0], "bodies": "file", "bodies_file": "one.csv", "period": [5.0 * R, 0.0], "alert_distance": 0.1 * R, "skin": 0.1 * R},
+                "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]},
+                             {"name": "lid", "shape": "plane", "point": [0.0, 2.0 * R], "normal": [0.0, -1.0], "free": [False, True], "pressure": 50.0, "mass": 1.0}],
+                "time": {"step": 1e-3, "steps": 10}, "solver": {"accuracy": 1e-6}, "output": {"directory": ".", "boundary_forces": True}}
+        self.assert_status(run_case(case, 1, self.here("cell")), 0)
+        with self.assertRaisesRegex(gravier.ResultsError, "no column stress_xx, which a periodic axis needs"):
+            gravier.wall_test(gravier.Run(self.here("cell")))
+        case["output"]["stress"] = True
+        self.assert_status(run_case(case, 1, self.here("cell")), 0)
+        found = gravier.wall_test(gravier.Run(self.here("cell")))
+        self.assertAlmostEqual(found.axial_stress[-1], 50.0, places=5)
+        self.assertAlmostEqual(found.solid_fraction[-1], np.pi / 10.0, places=6)
+        self.assertAlmostEqual(found.lateral_stress[-1], 0.0, places=9)
+
+
+class Command(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        """A column of disks of two sizes, of which the large ones lie below, collapses when a gate is taken away."""
+        super().setUpClass()
+        cls.directory = cls.here(cls, "run")
+        os.makedirs(cls.directory)
+        place = np.concatenate([1.4 * grid(4, 3), grid(5, 15) * [1.1, 1.0] + [0.0, 8.6 * R]])
+        radius = np.array([1.4 * R] * 12 + [R] * 75)
+        rows = "".join(f"{k + 1},{x!r},{y!r},{r!r}\n" for k, ((x, y), r) in enumerate(zip(place.tolist(), radius.tolist())))
+        write(os.path.join(cls.directory, "column.csv"), "id,x,y,radius\n" + rows)
+        case = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "column.csv", "friction": 0.5, "wall_friction": 0.5, "density": 2500.0, "alert_distance": 0.002},
+                "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}, {"name": "left", "shape": "plane", "normal": [1.0, 0.0]},
+                             {"name": "gate", "shape": "plane", "point": [11.3 * R, 0.0], "normal": [-1.0, 0.0], "remove_at": 0.05}],
+                "time": {"step": 1e-3, "steps": 800}, "output": {"directory": "results", "every": 50, "contacts": False}}
+        run = run_case(case, 1, cls.directory)
+        assert run.status == 0, run
+
+    def measure(self, *arguments):
+        return script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), *arguments, directory=self.directory, environment=ENVIRONMENT)
+
+    def test_collapse(self):
+        """The table of the command has what the function returns; the column spreads to more than twice its width and half of its height, and small grains stay above
+        large ones and mix with them."""
+        done = self.measure("heap", "results", "--since", "0.05")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stdout, r"^last row: time 0\.8 s, height 0\.\d+ m, front low .*, run out \d.*\nresults/heap\.csv\n$")
+        found, known = (gravier.read_table(os.path.join(self.directory, "results/heap.csv")),
+                        gravier.heap(gravier.Run(os.path.join(self.directory, "results")), since=0.05))
+        self.assertEqual(list(found), list(known))
+        for name in known:
+            np.testing.assert_allclose(found[name], known[name], rtol=1e-8)
+        self.assertEqual(found.step.tolist(), list(range(50, 801, 50)))
+        self.assertAlmostEqual(found.length[0], 11.3 * R, delta=1.5 * R)
+        self.assertGreater(found.run_out[-1], 1.2)
+        self.assertLess(found.height[-1], 0.6 * found.height[0])
+        self.assertTrue(5.0 < found.angle_high[-1] < 40.0, found.angle_high[-1])
+        done = self.measure("mixing", "results", "--cell", "0.05", "--out", "sizes.csv")
+        self.assertEqual((done.returncode, done.stdout.splitlines()[-1]), (0, "sizes.csv"), done.stderr)
+        sizes = gravier.read_table(os.path.join(self.directory, "sizes.csv"))
+        np.testing.assert_allclose(sizes.share, 12 / 87)
+        self.assertAlmostEqual(sizes.segregation[0], -1.0, places=6)
+        self.assertTrue(np.all(sizes.segregation < -0.2) and sizes.mixing[0] < 0.4)
+
+    def test_pictures(self):
+        """Columns of a table that have numbers, or those that are told, have a panel each."""
+        path = os.path.join(self.directory, "results/heap.csv")
+        gravier.write_table(path, gravier.heap(gravier.Run(os.path.join(self.directory, "results"))))
+        runs = [gravier.Run(os.path.join(self.directory, "results"))]
+        figure = draw_history(runs, None, table="heap.csv")
+        self.assertEqual([axes.get_ylabel() for axes in figure.axes if "low" not in axes.get_ylabel()],
+                         ["height [m]", "front high [m]", "length [m]", "run out", "angle high [degrees]"])
+        self.assertEqual([axes.get_ylabel() for axes in draw_history(runs, ["run_out"], table="heap.csv").axes], ["run out"])
+        done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "heap.csv", directory=self.directory, environment=ENVIRONMENT)
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "results/heap.png\n", ""))
+        done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "walls.csv", directory=self.directory, environment=ENVIRONMENT)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertEqual(done.stderr, "gravier_plot: results/walls.csv: No such file or directory; expected a table that a run wrote\n")
+
+    def test_refusals(self):
+        """One line and status 2; what is there stays."""
+        write(os.path.join(self.directory, "mine.csv"), "name,value\n")
+        for arguments, words in ((["heap", "results", "--out", "mine.csv"], "mine.csv: there is a file of another kind or origin"),
+                                 (["heap", "results", "--out", "results/history.csv"], "history.csv: there is a file of another kind or origin"),
+                                 (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
+                                 (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
+                                 (["mixing", "results", "--by", "material"], "material None; expected one of"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
+                                 (["walls", "results", "--mean", "0"], "expected an integer >= 1"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
+            with self.subTest(arguments=arguments):
+                done = self.measure(*arguments)
+                self.assertEqual((done.returncode, done.stdout), (2, ""))
+                self.assertRegex(done.stderr, rf"^gravier_measure: error: .*{words}.*\n$")
+        with open(os.path.join(self.directory, "mine.csv"), encoding="ascii") as file:
+            self.assertEqual(file.read(), "name,value\n")
+
+
+if __name__ == "__main__":
+    unittest.main()
