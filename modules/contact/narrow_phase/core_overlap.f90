@@ -19,6 +19,8 @@ module gravier_core_overlap
   real(dp), parameter :: parallel = 1.0e-9_dp
   !> whose faces have the axis, and with it the vertex of the other piece touches: of a, of b, of neither
   integer, parameter :: of_a = 1, of_b = 2, of_neither = 3
+  !> less than any separation [m]
+  real(dp), parameter :: nowhere = -huge(1.0_dp)
   !> a cosine whose sign rounding may have changed
   real(dp), parameter :: doubtful = 1.0e-9_dp
 
@@ -45,7 +47,7 @@ contains
     found%distance = -huge(1.0_dp)
     do f = 1, size(a%face_normal, 2)
       n(:) = -a%face_normal(:, f)
-      call try_axis(a, b, pair, n, of_a, found, taken)
+      call try_axis(a, b, pair, n, of_a, nowhere, found, taken)
     end do
     call try_faces_of_b(a, b, pair, found)
     call find_edges(a, edges_a)
@@ -54,7 +56,7 @@ contains
     if (found%distance > -huge(1.0_dp)) return
     ! cores without faces and without edges that cross
     call find_any_axis(pair, edges_a, edges_b, a, b, n)
-    call try_axis(a, b, pair, n, of_neither, found, taken)
+    call try_axis(a, b, pair, n, of_neither, nowhere, found, taken)
   end subroutine find_least_separation
 
   !> The same where the normals of the faces of the second piece are the only directions.
@@ -78,18 +80,20 @@ contains
 
     do f = 1, size(b%face_normal, 2)
       call turn(pair, b%face_normal(:, f), n)
-      call try_axis(a, b, pair, n, of_b, found, taken)
+      call try_axis(a, b, pair, n, of_b, nowhere, found, taken)
     end do
   end subroutine try_faces_of_b
 
-  !> Take an axis where it is better than that before.
-  pure subroutine try_axis(a, b, pair, n, owner, found, taken)
+  !> Take an axis where it is better than that before, and separates the pieces by no less than `least`.
+  pure subroutine try_axis(a, b, pair, n, owner, least, found, taken)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     !> unit vector
     real(dp), intent(in) :: n(3)
     !> of_a, of_b or of_neither
     integer, intent(in) :: owner
+    !> [m]
+    real(dp), intent(in) :: least
     type(core_distance_t), intent(inout) :: found
     logical, intent(out) :: taken
     real(dp) :: x(3), y(3), separation
@@ -100,7 +104,7 @@ contains
     call place_a(a, pair, i, x)
     call place_b(b, pair, j, y)
     separation = dot_product(n, x) - dot_product(n, y)
-    taken = separation > found%distance + better*(pair%radius_a + pair%radius_b)
+    taken = separation > found%distance + better*(pair%radius_a + pair%radius_b) .and. separation >= least
     if (.not. taken) return
     found%distance = separation
     found%normal(:) = n
@@ -121,13 +125,14 @@ contains
   end subroutine try_axis
 
   !> Common normals of edges of both. A normal comes into question where the arcs of the normals of both edges cross, those of b
-  !> seen from behind. Then the two edges are the outermost parts of their pieces along it.
+  !> seen from behind. The two edges are the outermost parts of their pieces along it, but for an edge of a flat piece: the normals of
+  !> its two faces are opposite to each other, and do not tell on which side of the piece it is.
   pure subroutine try_edges(a, b, pair, edges_a, edges_b, found)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     type(edges_t), intent(in) :: edges_a, edges_b
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared
+    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared, bound
     !> of the edge of b against the faces of a; 0 for an edge that has none
     real(dp) :: slope(0:size(a%face_normal, 2))
     integer :: i, j, f, turned
@@ -159,10 +164,12 @@ contains
         n(:) = n/sqrt(squared)
         call place_a(a, pair, edges_a%vertex(1, i), x)
         do turned = 1, 2
-          ! any two points bound the separation from above
-          if (dot_product(n, x) - dot_product(n, y) > found%distance) then
+          ! any two points bound the separation from above, and those of outermost edges are as far apart as the pieces
+          bound = dot_product(n, x) - dot_product(n, y)
+          if (bound > found%distance) then
             taken = faces_other(n, a, edges_a%face(:, i), normal_b)
-            if (taken) call try_axis(a, b, pair, n, of_neither, found, taken)
+            bound = bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b))
+            if (taken) call try_axis(a, b, pair, n, of_neither, bound, found, taken)
             if (taken) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
           end if
           n(:) = -n

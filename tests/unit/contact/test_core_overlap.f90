@@ -1,9 +1,9 @@
-!> The direction in which two convex cores that overlap are least separated: cubes and rods by formulas, random hulls by trying all
-!> axes that can be it.
+!> The direction in which two convex cores that overlap are least separated: cubes and rods by formulas, random hulls, and those over
+!> the edge of a sheet, by trying all axes that can be it.
 program test_core_overlap
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
-  use gravier_convex_piece, only: convex_piece_t
+  use gravier_convex_piece, only: convex_piece_t, list_faces
   use gravier_convex_distance, only: placed_pair_t, core_distance_t, place_a, place_b
   use gravier_core_overlap, only: find_least_separation
   use gravier_simple_shapes, only: make_capsule, make_polyhedron
@@ -19,6 +19,7 @@ program test_core_overlap
   call test_overlap()
   call test_overlap_of_rods()
   call test_all_axes()
+  call test_edge_of_sheet()
   call finish_checks()
 
 contains
@@ -131,6 +132,56 @@ contains
     call check_close(beside, 0.0_dp, 1.0e-12_dp, "the points of the contact are on both hulls")
     call check(by_edges > 50, "some of them are common normals of edges")
   end subroutine test_all_axes
+
+  !> Cubes turned at random over an edge of a long sheet without a thickness. Its two faces have opposite normals, which do not tell on
+  !> which side of the sheet an edge is: the edge that is met is the near one, and not that on the other side, which is parallel.
+  subroutine test_edge_of_sheet()
+    integer, parameter :: trials = 400
+    !> of the sheet along x and y
+    real(dp), parameter :: long = 4.0_dp, wide = 50.0_dp
+    type(draws_t) :: draws
+    type(turn_t) :: turn
+    type(convex_piece_t) :: sheet
+    type(placed_pair_t) :: pair
+    type(core_distance_t) :: found
+    real(dp) :: place(3), x(3), best, worst, beside
+    integer :: trial, by_edges
+    logical :: edges
+
+    sheet%vertex = reshape([-long, -wide, 0.0_dp, 0.0_dp, -wide, 0.0_dp, 0.0_dp, wide, 0.0_dp, -long, wide, 0.0_dp], [3, 4])
+    sheet%corner = sheet%vertex
+    sheet%face_first = [1, 5, 9]
+    sheet%face_vertex = [1, 2, 3, 4, 4, 3, 2, 1]
+    sheet%neighbour_first = [1, 3, 5, 7, 9]
+    sheet%neighbour = [2, 4, 1, 3, 2, 4, 1, 3]
+    call list_faces(sheet)
+    sheet%face_normal = reshape([0.0_dp, 0.0_dp, 1.0_dp, 0.0_dp, 0.0_dp, -1.0_dp], [3, 2])
+    draws%seed = 5
+    worst = 0.0_dp
+    beside = 0.0_dp
+    by_edges = 0
+    do trial = 1, trials
+      turn = random_turn(draws)
+      pair = placed_pair_t()
+      pair%rotation(:, :) = turn%m
+      place(1) = draws%between(0.0_dp, 1.5_dp*half)
+      place(2) = draws%between(-wide + 2.0_dp, wide - 2.0_dp)
+      place(3) = draws%between(-half, half)
+      pair%way(:) = matmul(turn%m, place)
+      pair%way(:) = -pair%way
+      call find_least_separation(box%piece(1), sheet, pair, found)
+      call try_all_axes(box%piece(1), sheet, pair, best, edges)
+      if (best >= 0.0_dp) cycle
+      worst = max(worst, abs(found%distance - best))
+      if (edges) by_edges = by_edges + 1
+      place(:) = found%point_b - pair%way
+      x(:) = matmul(place, turn%m)
+      beside = max(beside, outside(box%piece(1), sheet, pair, found), x(1), -long - x(1), abs(x(2)) - wide)
+    end do
+    call check_close(worst, 0.0_dp, 1.0e-12_dp, "edge of a sheet: no axis separates more")
+    call check_close(beside, 0.0_dp, 1.0e-12_dp, "edge of a sheet: the points are on the cube and on the sheet")
+    call check(by_edges > 50, "edge of a sheet: some are met by an edge of the cube")
+  end subroutine test_edge_of_sheet
 
   !> How far the points of a contact are outside the cores that they belong to [m].
   pure real(dp) function outside(a, b, pair, found)
