@@ -9,6 +9,7 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_join: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool  # noqa: E402
+from whole_file import NOWHERE  # noqa: E402
 
 
 def parse(arguments):
@@ -32,10 +33,10 @@ def main(arguments=None):
         print(f"gravier_join: error: {plain(refused)}", file=sys.stderr)
         return 2
     except OSError as problem:
-        print(f"gravier_join: error: {plain(problem.filename or options.out)}: {plain(problem.strerror or problem)}", file=sys.stderr)
-        return 4
+        print(f"gravier_join: error: {plain(options.out)}: {plain(problem.strerror or problem)}; expected a file that can be written", file=sys.stderr)
+        return 2 if isinstance(problem, NOWHERE) else 4
     for file, first, last, walls, forces, near in zip(*rows.values()):
-        left = f"; its {walls} walls and {forces} forces of contacts are left out" if walls or forces else ""
+        left = "; left out: " + ", ".join(f"{what} {count}" for what, count in (("walls", walls), ("forces of contacts", forces)) if count) if walls or forces else ""
         balls = f"; {near} pair{'s' if near > 1 else ''} of enclosing balls meet, whose shapes may overlap: see max_overlap of the first step" if near else ""
         print(f"{file}: {f'body {first}' if first == last else f'bodies {first} to {last}'}{left}{balls}")
     print(options.out)

@@ -211,7 +211,8 @@ class Joined(RunTestCase):
         self.assertLess(history["body_y:84"][-1], place[1] - 0.02)
         self.assertGreater(np.linalg.norm(found.bodies(300).position - start.position, axis=1)[:-1].max(), 1e-3)
         for arguments, words in ((["--shift", "0", "-1e-3"], r"ball.csv: body 1 .*"), (["--shift", "0"], r"shift \[0.0\]: expected 2 numbers"), (["--density", "-1"], "expected a number > 0"),
-                                 (["--above", "x"], "expected a number")):
+                                 (["--above", "x"], "expected a number"),
+                                 (["--above", "0.02", "--out", "/proc/q.h5"], "/proc/q.h5: No such file or directory; expected a file that can be written")):
             before = os.path.getmtime(self.here("fall", "with_ball.h5"))
             done = script(tool, "bed.h5", "ball.csv", "--out", "with_ball.h5", "--density", "7800", *arguments, directory=self.here("fall"), environment=ENVIRONMENT)
             self.assertEqual((done.returncode, done.stdout, os.path.getmtime(self.here("fall", "with_ball.h5"))), (2, "", before))
