@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
 """Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls."""
-import argparse
 import sys
 from pathlib import Path
 
@@ -12,7 +11,7 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
 from gravier.wall_tests import stresses_from  # noqa: E402
-from one_line import OneLineParser, plain, positive, run_tool, whole  # noqa: E402
+from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
 from whole_file import claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
@@ -20,17 +19,6 @@ HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": 
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
          "angle_low": "degrees", "angle_high": "degrees"}
-
-
-def number(text):
-    """The type of an option that is a finite number."""
-    try:
-        found = float(text)
-    except ValueError:
-        found = numpy.nan
-    if not numpy.isfinite(found):
-        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected a number")
-    return found
 
 
 def parse(arguments):
@@ -43,15 +31,16 @@ def parse(arguments):
     mixing.add_argument("--cell", type=positive, metavar="L", help="edge of the cells [m] (5 mean diameters, 3.5 in space)")
     heap = kinds.add_parser("heap", help="ends, run-out, height and slopes of a heap or a collapsed column, in each written state")
     heap.add_argument("--along", metavar="AXIS", help="x or y: in space a heap in a channel, in the place of a round one")
-    heap.add_argument("--shares", type=number, nargs=2, default=(0.1, 0.9), metavar=("LOW", "HIGH"), help="of the height, between which slopes are (0.1 0.9)")
+    heap.add_argument("--shares", type=finite, nargs=2, default=(0.1, 0.9), metavar=("LOW", "HIGH"), help="of the height, between which slopes are (0.1 0.9)")
     heap.add_argument("--width", type=positive, metavar="L", help="of the columns [m] (two mean diameters)")
-    heap.add_argument("--floor", type=number, metavar="Z", help="height of the floor [m] (that of the lowest grains)")
+    heap.add_argument("--floor", type=finite, metavar="Z", help="height of the floor [m] (that of the lowest grains)")
     walls = kinds.add_parser("walls", help="strains, void ratio, stress ratio and sin phi of a sample between planes (&output boundary_forces = .true.)")
     walls.add_argument("--axial", metavar="AXIS", help="axis of the load (the last one)")
     walls.add_argument("--lateral", metavar="AXES", help="axes whose mean stress the axial one is compared with (all others)")
     walls.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     for kind in (mixing, heap, walls):
-        kind.add_argument("--since", type=number, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
+        kind._negative_number_matcher = NEGATIVE
+        kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
         kind.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
         kind.add_argument("--out", type=Path, metavar="FILE", help=f"the table, .csv ({kind.prog.split()[-1]}.csv in DIR)")
     return parser.parse_args(arguments)

@@ -17,14 +17,12 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
-from one_line import OneLineParser, plain, run_tool
+from one_line import NEGATIVE, OneLineParser, plain, run_tool
 from packing_picture import COLOURS, draw_packing
 from picture_style import PictureError
 from whole_file import PICTURES, claim, save_figure
 
 
-#: what begins with a minus and is a number
-NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 #: along the longer side of a picture in dots: its memory is the square of them
 MOST_DOTS = 20000
 #: columns of history.csv that are drawn unless told

@@ -1,9 +1,14 @@
 """Command lines whose errors are one line, as those of the programs, and tools that end in an orderly way."""
 import argparse
 import math
+import re
 import signal
 import sys
 import unicodedata
+
+
+#: what begins with a minus and is a number; a parser takes -1e-3 for an option unless its `_negative_number_matcher` is this
+NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")
 
 
 def plain(text):
@@ -39,6 +44,17 @@ def positive(text):
         number = 0.0
     if not 0.0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"'{plain(text)}': expected a number > 0")
+    return number
+
+
+def finite(text):
+    """The type of an option that is a finite number."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected a number")
     return number
 
 

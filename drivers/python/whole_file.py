@@ -14,6 +14,8 @@ from one_line import plain
 #: what files of a kind begin with, by the ending of their names
 PICTURES = {".png": rb"\x89PNG", ".svg": rb"(?s).*<svg"}
 MOVIES = {".gif": rb"GIF8", ".mp4": rb"(?s).{4}ftyp"}
+#: errors of a place where no file can be
+NOWHERE = (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
 #: bytes in which the beginning of a file is looked for
 HEAD = 4096
 
@@ -149,8 +151,7 @@ def written(path, kinds, reads=()):
     except OSError as what:
         print(f"{_program()}: error: {path}: {' '.join(str(what.strerror or what).split())}; expected a file that "
               "can be written", file=sys.stderr)
-        nowhere = isinstance(what, (FileExistsError, FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError))
-        sys.exit(2 if nowhere else 4)
+        sys.exit(2 if isinstance(what, NOWHERE) else 4)
 
 
 @contextlib.contextmanager

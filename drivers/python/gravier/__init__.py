@@ -11,6 +11,7 @@ from .arrays import StaleArray
 from .case import CaseError, entries, namelist, parse_namelist, run, value_text
 from .checksum import seal
 from .heaps import heap
+from .joined_bodies import join_bodies
 from .library import SimulationError
 from .mixing import mixing
 from .restarts import write_bodies
@@ -23,5 +24,5 @@ from .tables import ResultsError, Table, read_table, write_table
 from .wall_tests import wall_test
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "entries", "heap", "mixing", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text", "wall_test",
-           "write_bodies", "write_table"]
+           "entries", "heap", "join_bodies", "mixing", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text",
+           "wall_test", "write_bodies", "write_table"]

@@ -5,6 +5,8 @@ from whole_file import whole_file
 
 from .case import CaseError
 
+#: what the first line of a sealed table begins with
+SEAL = b"# checksum "
 _LOW = np.uint64(0xFFFFFFFF)
 _FACTORS = (np.uint64(0x6C62272E), np.uint64(0x5BD1E995))
 _STEP = np.uint64(2654435769)
@@ -59,13 +61,24 @@ def seal(path):
     if wrong:
         raise CaseError(f"{path}: {wrong}; expected a table in CSV that a case names")
     lines = text.split(b"\n")
-    if lines[0].startswith(b"# checksum "):
+    if lines[0].startswith(SEAL):
         del lines[0]
+    with whole_file(path) as part:
+        part.write_bytes(b"\n".join([SEAL + b"%016x" % _of_lines(lines), *lines]))
+
+
+def sealed_as(text):
+    """Whether a table in CSV is what its first line has the checksum of; True where it has none."""
+    first, _, rest = text.partition(b"\n")
+    return not first.startswith(SEAL) or first[len(SEAL):].strip() == b"%016x" % _of_lines(rest.split(b"\n"))
+
+
+def _of_lines(lines):
+    """The checksum of a table in CSV without its first line that seals it."""
     digest = np.uint64(0)
     # an end of the last line makes no line more
     for k, line in enumerate(lines if lines[-1] else lines[:-1]):
         padded = line.ljust(8 * (len(line) // 8 + 1))
         words = np.append(np.frombuffer(padded, dtype=np.uint64), np.uint64(len(line)))
         digest ^= _of_rows(words[None, :], np.array([k + 3], dtype=np.uint64))
-    with whole_file(path) as part:
-        part.write_bytes(b"\n".join([b"# checksum %016x" % int(digest), *lines]))
+    return int(digest)

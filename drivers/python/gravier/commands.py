@@ -26,6 +26,10 @@ def gravier_import():
     _run("gravier_import")
 
 
+def gravier_join():
+    _run("gravier_join")
+
+
 def gravier_measure():
     _run("gravier_measure")
 

@@ -10,10 +10,10 @@ from .tables import ResultsError
 PROGRAM = "gravier.write_bodies"
 
 
-def claim_bodies_file(path, program, source):
-    """Refuse a path at which a bodies file of `program`, made from `source`, is not to be written."""
+def claim_bodies_file(path, program, *sources):
+    """Refuse a path at which a bodies file of `program`, made from `sources`, is not to be written."""
     try:
-        check_place(path, dict.fromkeys((".h5", ".hdf5"), program), [source])
+        check_place(path, dict.fromkeys((".h5", ".hdf5"), program), sources)
     except Misplaced as refused:
         raise ResultsError(str(refused)) from None
 
