@@ -262,7 +262,8 @@ contains
       self%physics%theta = self%config%time%theta
       self%rest_energy = self%config%time%rest_energy
       associate (solver => self%config%solver)
-        self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed)
+        self%sleeping = sleeping_rule_t(merge(solver%sleep_after, 0, solver%sleeping), solver%sleep_speed, &
+          & solver%accuracy)
       end associate
       self%effects = scene%effects
       call self%problem%kernels%choose(config%dimension, scene%effects)

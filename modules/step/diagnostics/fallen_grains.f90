@@ -51,13 +51,17 @@ contains
     type(physics_t), intent(in) :: physics
     real(dp) :: down(3), floor, first
     integer :: nd, s, k, r
+    logical :: applies
 
     self%number = 0
     self%first = 0
-    if (.not. norm2(physics%gravity) > 0.0_dp) return
-    down(:) = physics%gravity/norm2(physics%gravity)
-    if (any(decomposition%period%length > 0.0_dp .and. abs(down) > level)) return
-    floor = -huge(1.0_dp)
+    applies = norm2(physics%gravity) > 0.0_dp
+    if (applies) down(:) = physics%gravity/norm2(physics%gravity)
+    if (applies) applies = .not. any(decomposition%period%length > 0.0_dp .and. abs(down) > level)
+    ! ranks that have come to differ by the loop of a user go through the same messages
+    if (.not. decomposition%comm%any_true(applies)) return
+    floor = merge(-huge(1.0_dp), huge(1.0_dp), applies)
+    if (.not. applies) down(:) = 0.0_dp
     do k = 1, size(decomposition%boundaries)
       floor = max(floor, lowest_place(decomposition%boundaries(k), down))
     end do

@@ -19,6 +19,8 @@ module gravier_imposed_motion
     real(dp) :: difference = 0.0_dp
     !> velocity of all boundaries where they move alike, else 0 [m/s]
     real(dp) :: common(3) = 0.0_dp
+    !> the larger of both: what bodies that touch boundaries may be carried with [m/s]
+    real(dp) :: carries = 0.0_dp
     !> there is a boundary that grains touch
     logical :: bounded = .false.
   end type imposed_motion_t
@@ -44,6 +46,7 @@ contains
     end do
     call compare(nd, boundaries, velocity, spin, lever, physics, motion)
     motion%difference = max(motion%difference, norm2(merge(0.0_dp, physics%cell%free, physics%cell%driven))*diameter)
+    motion%carries = max(motion%difference, norm2(motion%common))
   end subroutine find_imposed
 
   !> The largest of the differences of a time and of the times ten steps before and after it, so that a drive that turns round

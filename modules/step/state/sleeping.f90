@@ -6,7 +6,9 @@
 !> `share` times the sum H r of the contacts' impulses on it too, which is all that holds a body up: those that cling to each other
 !> press each other with more. Impulses of a boundary that moves count as changed. A step counts where the grains that it touches
 !> are at rest too. A grain that has counted half of `after` steps stands still: what the impulses of solves do not balance would
-!> else add up, step by step. After `after` steps it sleeps.
+!> else add up, step by step. After `after` steps it sleeps. Errors of solves go to and fro, and what carries a grain does not: before
+!> a grain stands still its mean velocity over the steps that it has counted is at most a `wandering` share of the velocity error
+!> that solves may leave, or it counts anew.
 !>
 !> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
 !> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left
@@ -20,6 +22,7 @@ module gravier_sleeping
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation, multiply_mass
   use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
@@ -35,6 +38,8 @@ module gravier_sleeping
   real(dp), parameter :: share = 0.1_dp, settled = 0.05_dp
   !> the same momentum over that of the velocity which boundaries impose: a body that a slow boundary carries is not at rest
   real(dp), parameter :: share_of_drive = 0.2_dp
+  !> mean velocity of a body that may stand still, over the accepted velocity error
+  real(dp), parameter :: wandering = 0.03_dp
 
   !> What the contacts of the bodies of a subdomain say.
   type :: rest_t
@@ -45,7 +50,7 @@ module gravier_sleeping
     logical, allocatable :: rests(:)
     !> steps at rest, with this one (n_grains); places in the view (n_columns)
     integer, allocatable :: steps(:), seen(:)
-    !> momenta that the step leaves to the grains that fall asleep, 0 of others (nv, n_grains) [N s, N m s]
+    !> what the step leaves to the grains: momenta of those that fall asleep [N s, N m s], velocities of others (nv, n_grains)
     real(dp), allocatable :: left(:, :)
   end type rest_t
 
@@ -54,6 +59,8 @@ module gravier_sleeping
     integer :: after = 0
     !> twice the largest momentum of a body at rest over the root mean square of the impulses
     real(dp) :: speed = 0.0_dp
+    !> accepted velocity error over its scale
+    real(dp) :: accuracy = 0.0_dp
   end type sleeping_rule_t
 
 contains
@@ -95,14 +102,12 @@ contains
         call problem%shared%sum_copies(s, own%restless, mean=.false.)
         call find_seen(view%list, sub, own%seen)
         allocate (own%steps(sub%n_grains), source=0)
-        allocate (own%left(problem%kernels%nv, sub%n_grains), source=0.0_dp)
+        allocate (own%left(problem%kernels%nv, sub%n_grains))
+        own%left(:, :) = sub%v_global(:, 1:sub%n_grains)
         do b = 1, sub%n_grains
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
           own%steps(b) = min(view%bodies%rest(own%seen(b)) + 1, merge(rule%after, rule%after - 1, stops))
-          if (own%steps(b) >= rule%after) then
-            own%left(:, b) = sub%v_global(:, b)
-            call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), own%left(:, b))
-          end if
+          if (own%steps(b) >= rule%after) call multiply_mass(sub%inverse_mass(:, b), sub%inverse_mass(:, b), own%left(:, b))
           if (stops .and. 2*own%steps(b) >= rule%after) sub%v_global(:, b) = 0.0_dp
         end do
         call find_leaving(sub, rule%after, own%steps, leaving(s)%are)
@@ -239,8 +244,8 @@ contains
     end do
   end subroutine find_leaving
 
-  !> Bring steps at rest, the momenta that wake and those left to the owners of the grains, in this subdomain by their places, in
-  !> others by records (owner, grain, steps, momentum, momenta left). Collective.
+  !> Bring steps at rest, the momenta that wake and what is left to the owners of the grains, in this subdomain by their places, in
+  !> others by records (owner, grain, steps, momentum, what is left). Collective.
   subroutine bring_home(rule, problem, rest, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     type(contact_problem_t), intent(in) :: problem
@@ -309,17 +314,37 @@ contains
     !> Set what is known of grain `place` of subdomain `h` of this rank.
     subroutine put(h, place, steps, momentum, left)
       integer, intent(in) :: h, place, steps
-      !> that wakes it [N s]; all that is left to it (nv) [N s, N m s]
+      !> that wakes it [N s]; what is left to it (nv) [N s, N m s], or of one that does not sleep [m/s, rad/s]
       real(dp), intent(in) :: momentum, left(:)
 
-      associate (owned => decomposition%owned(h))
-        owned%rest(place) = steps
-        if (steps < rule%after) return
-        owned%wakes_at(place) = momentum
-        owned%held(1:size(left), place) = -left
-      end associate
+      decomposition%owned(h)%rest(place) = steps
+      call note_motion(rule%after, rule%accuracy*problem%error_scale, place, left, decomposition%owned(h))
+      if (steps < rule%after) return
+      decomposition%owned(h)%wakes_at(place) = momentum
+      decomposition%owned(h)%held(1:size(left), place) = -left
     end subroutine put
 
   end subroutine bring_home
+
+  !> Sum up the velocities of body `k` over its steps at rest until it stands still. In the last one before that it counts anew if
+  !> their mean is more than errors of solves leave.
+  pure subroutine note_motion(after, accepted, k, velocity, bodies)
+    !> steps after which a body sleeps; it stands still from half of them on
+    integer, intent(in) :: after
+    !> velocity error that solves may leave [m/s]
+    real(dp), intent(in) :: accepted
+    integer, intent(in) :: k
+    !> of the step (nv) [m/s, rad/s]
+    real(dp), intent(in) :: velocity(:)
+    type(body_set_t), intent(inout) :: bodies
+
+    associate (steps => bodies%rest(k), sum_of => bodies%wandered(1:size(velocity), k))
+      if (steps == 0 .or. 2*steps >= after) return
+      if (steps == 1) sum_of(:) = 0.0_dp
+      sum_of(:) = sum_of + velocity
+      if (2*(steps + 1) < after) return
+      if (momentum_of(sum_of, bodies%nd, bodies%radius(k), 1.0_dp) > steps*wandering*accepted) steps = 0
+    end associate
+  end subroutine note_motion
 
 end module gravier_sleeping

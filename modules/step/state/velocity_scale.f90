@@ -195,8 +195,8 @@ contains
     call set_concerns(self, physics, self%frame, sums(5:7), problem)
     problem%error_scale = self%value
     problem%drive_scale = huge(1.0_dp)
-    ! what a drive that starts carries is not at rest: here the present velocities count
-    if (motion%difference > 0.0_dp) problem%drive_scale = max(motion%difference, self%creep)
+    ! what a drive carries is not at rest, be it that all boundaries move alike: here the present velocities count
+    if (motion%carries > 0.0_dp) problem%drive_scale = max(motion%carries, self%creep)
   end subroutine velocity_scale_measure
 
   !> Whether bodies move by more than what errors are compared with.

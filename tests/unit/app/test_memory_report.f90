@@ -35,9 +35,9 @@ program test_memory_report
     call check_equal(other(near_pair), plain(near_pair), "near pair with friction and no warm start")
     call check_equal(other(at_home) - plain(at_home), int(spin(nd) + inertia, i8), "grain with friction: spin and inertia")
     call count_bytes(nd, "friction = 0", "warm_start = .true., sleeping = .true.", "", other)
-    call check_more(0, 16, 0, "bodies that may sleep have impulses that they bear, pairs a mark and a place", 32 + 16*nd)
+    call check_more(0, 16, 0, "bodies that may sleep have what they bear and have gone, pairs a mark and a place", 32 + 32*nd)
     call count_bytes(nd, "friction = 0", "warm_start = .true., sleeping = .true.", bridges, other)
-    call check_more(8, 20, 8*nd, "bridges have a state, and attract", 32 + 16*nd)
+    call check_more(8, 20, 8*nd, "bridges have a state, and attract", 32 + 32*nd)
   end do
   call finish_checks()
   call comm%free()
@@ -126,7 +126,8 @@ contains
 
     bytes = (8*size(bodies%id) + 8*size(bodies%position) + 8*size(bodies%velocity) + 8*size(bodies%radius) + 8*size(bodies%mass) + &
       & 8*size(bodies%inertia) + 4*size(bodies%glued) + 4*size(bodies%material) + 4*size(bodies%image) + &
-      & 4*size(bodies%rest) + 4*size(bodies%stirred) + 8*size(bodies%wakes_at) + 8*size(bodies%held))/bodies%n
+      & 4*size(bodies%rest) + 4*size(bodies%stirred) + 8*size(bodies%wakes_at) + 8*size(bodies%held) + &
+      & 8*size(bodies%wandered))/bodies%n
   end function grain_bytes
 
 end program test_memory_report

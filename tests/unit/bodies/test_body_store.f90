@@ -285,7 +285,8 @@ contains
     layout = body_layout_t(sizes(1), sizes(2), sizes(3))
     call others%init(layout, 2)
     call check(.not. others%sleeps(1), "where none may sleep none does")
-    call check_equal(size(others%rest) + size(others%wakes_at) + size(others%held) + size(others%stirred), 0, &
+    call check_equal(size(others%rest) + size(others%wakes_at) + size(others%held) + size(others%wandered) + &
+      & size(others%stirred), 0, &
       & "and nothing is kept for it")
     layout%nr = 1
     call bodies%init(layout, 2)
@@ -307,6 +308,7 @@ contains
     bodies%wakes_at(2) = 0.25_dp
     bodies%held(:, 2) = 0.5_dp
     bodies%stirred(2) = 1
+    bodies%wandered(:, 2) = 0.25_dp
     allocate (record(bodies%record_words()), renewed(bodies%renewed_words()))
     call bodies%get_record(2, record)
     first = layout%saved_words() - layout%rest_words() + 1
@@ -317,6 +319,8 @@ contains
     call check(size(others%held, 1) == sizes(2) .and. all(abs(others%held(:, 1) - 0.5_dp) < 1.0e-15_dp), &
       & "and bears what it has borne")
     call check_equal(others%stirred(1), 1, "it is known that this has changed")
+    call check(size(others%wandered, 1) == sizes(2) .and. all(abs(others%wandered(:, 1) - 0.25_dp) < 1.0e-15_dp), &
+      & "and how it has moved at rest")
     call bodies%get_renewed(2, renewed)
     call others%set_renewed(2, renewed)
     call check(others%sleeps(2), "its copies know of it")
@@ -330,6 +334,7 @@ contains
     call others%wake(1)
     call check(.not. any(abs(others%held) > 0.0_dp), "and bears nothing of contacts that are left out")
     call check_equal(others%stirred(1), 0, "and its impulses have not changed")
+    call check(.not. any(abs(others%wandered) > 0.0_dp), "nor has it moved at rest")
     record(first) = -1
     call check(layout%invalid_field(record, 0, 0, 0) == "rest", "no body has rested for less than no step")
   end subroutine test_rest
