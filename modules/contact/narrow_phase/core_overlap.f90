@@ -41,13 +41,12 @@ contains
     type(edges_t) :: edges_a, edges_b
     real(dp) :: n(3)
     integer :: f
-    logical :: taken
 
     found%overlap = .true.
     found%distance = -huge(1.0_dp)
     do f = 1, size(a%face_normal, 2)
       n(:) = -a%face_normal(:, f)
-      call try_axis(a, b, pair, n, of_a, nowhere, found, taken)
+      call try_axis(a, b, pair, n, of_a, nowhere, found)
     end do
     call try_faces_of_b(a, b, pair, found)
     call find_edges(a, edges_a)
@@ -56,7 +55,7 @@ contains
     if (found%distance > -huge(1.0_dp)) return
     ! cores without faces and without edges that cross
     call find_any_axis(pair, edges_a, edges_b, a, b, n)
-    call try_axis(a, b, pair, n, of_neither, nowhere, found, taken)
+    call try_axis(a, b, pair, n, of_neither, nowhere, found)
   end subroutine find_least_separation
 
   !> The same where the normals of the faces of the second piece are the only directions.
@@ -76,16 +75,15 @@ contains
     type(core_distance_t), intent(inout) :: found
     real(dp) :: n(3)
     integer :: f
-    logical :: taken
 
     do f = 1, size(b%face_normal, 2)
       call turn(pair, b%face_normal(:, f), n)
-      call try_axis(a, b, pair, n, of_b, nowhere, found, taken)
+      call try_axis(a, b, pair, n, of_b, nowhere, found)
     end do
   end subroutine try_faces_of_b
 
   !> Take an axis where it is better than that before, and separates the pieces by no less than `least`.
-  pure subroutine try_axis(a, b, pair, n, owner, least, found, taken)
+  pure subroutine try_axis(a, b, pair, n, owner, least, found)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     !> unit vector
@@ -95,7 +93,6 @@ contains
     !> [m]
     real(dp), intent(in) :: least
     type(core_distance_t), intent(inout) :: found
-    logical, intent(out) :: taken
     real(dp) :: x(3), y(3), separation
     integer :: i, j
 
@@ -104,8 +101,7 @@ contains
     call place_a(a, pair, i, x)
     call place_b(b, pair, j, y)
     separation = dot_product(n, x) - dot_product(n, y)
-    taken = separation > found%distance + better*(pair%radius_a + pair%radius_b) .and. separation >= least
-    if (.not. taken) return
+    if (separation <= found%distance + better*(pair%radius_a + pair%radius_b) .or. separation < least) return
     found%distance = separation
     found%normal(:) = n
     select case (owner)
@@ -125,18 +121,17 @@ contains
   end subroutine try_axis
 
   !> Common normals of edges of both. A normal comes into question where the arcs of the normals of both edges cross, those of b
-  !> seen from behind. The two edges are the outermost parts of their pieces along it, but for an edge of a flat piece: the normals of
-  !> its two faces are opposite to each other, and do not tell on which side of the piece it is.
+  !> seen from behind. The two edges are the outermost parts of their pieces along it, but for an edge of a flat piece: the normals
+  !> of its two faces are opposite to each other, and do not tell on which side of the piece it is.
   pure subroutine try_edges(a, b, pair, edges_a, edges_b, found)
     type(convex_piece_t), intent(in) :: a, b
     type(placed_pair_t), intent(in) :: pair
     type(edges_t), intent(in) :: edges_a, edges_b
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared, bound
+    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared, bound, before
     !> of the edge of b against the faces of a; 0 for an edge that has none
     real(dp) :: slope(0:size(a%face_normal, 2))
     integer :: i, j, f, turned
-    logical :: taken
 
     do i = 1, edges_a%n
       along_a(:, i) = a%vertex(:, edges_a%vertex(2, i)) - a%vertex(:, edges_a%vertex(1, i))
@@ -167,10 +162,10 @@ contains
           ! any two points bound the separation from above, and those of outermost edges are as far apart as the pieces
           bound = dot_product(n, x) - dot_product(n, y)
           if (bound > found%distance) then
-            taken = faces_other(n, a, edges_a%face(:, i), normal_b)
+            before = found%distance
             bound = bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b))
-            if (taken) call try_axis(a, b, pair, n, of_neither, bound, found, taken)
-            if (taken) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
+            if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, of_neither, bound, found)
+            if (found%distance > before) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
           end if
           n(:) = -n
         end do

@@ -1,5 +1,5 @@
-!> The direction in which two convex cores that overlap are least separated: cubes and rods by formulas, random hulls, and those over
-!> the edge of a sheet, by trying all axes that can be it.
+!> The direction in which two convex cores that overlap are least separated: cubes and rods by formulas, random hulls, and cubes on
+!> the edge of a sheet by trying all axes that can be it.
 program test_core_overlap
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -133,8 +133,8 @@ contains
     call check(by_edges > 50, "some of them are common normals of edges")
   end subroutine test_all_axes
 
-  !> Cubes turned at random over an edge of a long sheet without a thickness. Its two faces have opposite normals, which do not tell on
-  !> which side of the sheet an edge is: the edge that is met is the near one, and not that on the other side, which is parallel.
+  !> Cubes turned at random over an edge of a long sheet without a thickness. Its two faces have opposite normals, which do not tell
+  !> on which side of the sheet an edge is: the edge that is met is the near one, and not that on the other side, which is parallel.
   subroutine test_edge_of_sheet()
     integer, parameter :: trials = 400
     !> of the sheet along x and y
