@@ -7,8 +7,8 @@
 !> press each other with more. Impulses of a boundary that moves count as changed. A step counts where the grains that it touches
 !> are at rest too. A grain that has counted half of `after` steps stands still: what the impulses of solves do not balance would
 !> else add up, step by step. After `after` steps it sleeps. Errors of solves go to and fro, and what carries a grain does not:
-!> before a grain stands still its mean velocity over the steps that it has counted is at most a `wandering` share of the velocity error
-!> that solves may leave, or it counts anew.
+!> before a grain stands still its mean velocity over the steps that it has counted is at most a `wandering` share of the velocity
+!> error that solves may leave, or it counts anew.
 !>
 !> Contacts between grains that sleep, or with boundaries at rest, leave the problem with the impulses that they have. Contacts with
 !> grains that are awake stay: there the sleeper is a body that cannot move. Where the impulses of a solve and those that were left
