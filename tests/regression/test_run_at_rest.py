@@ -126,6 +126,25 @@ class AtRest(RunTestCase):
         self.assertEqual(len(energy), 600)
         self.assertGreater((energy <= LOW).sum(), QUIET)
 
+    def test_what_begins_to_move(self):
+        """Light disks whose energy is low enough when they begin to fall, or when a cell begins to press them together, are not at rest: nothing
+        bears them. They are when they lie on the floor."""
+        pair = "id,x,y,radius\n1,0.02,0.02,0.01\n2,0.06,0.02,0.01\n"
+        for name, scene, boundaries, ends in (("fall", {}, [{"shape": "plane", "normal": [0.0, 1.0]}], True),
+                                              ("cell", {"gravity": [0.0, 0.0], "period": [0.08, 0.08], "cell_pressure": [1.0, 1.0]}, [], False)):
+            place = self.here(name)
+            os.makedirs(place)
+            write(os.path.join(place, "pair.csv"), pair)
+            run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "pair.csv", "density": 1000.0, **scene},
+                            "boundary": boundaries, "time": {"step": 1e-4, "steps": 600, "rest_energy": 1.0 if ends else 1e-2},
+                            "output": {"directory": "results", "every": 0}}, directory=place)
+            self.assert_status(run, 0)
+            energy = run.history()["kinetic_energy"]
+            self.assertLess(energy[:20].max(), 1e-2)
+            # they fall by 10 mm in 45 ms
+            self.assertEqual("at rest     after step" in run.stdout, ends)
+            self.assertGreater(len(energy), 440)
+
     def test_writes_the_last_state_and_a_checkpoint(self):
         self.assertEqual(steps_of(self.straight.results()), [len(self.energy)])
         self.assertRegex(self.straight.stdout, f"checkpoint  of step {len(self.energy)} written")
