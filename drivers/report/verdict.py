@@ -51,7 +51,7 @@ def ended(log, history, steps):
 
 def converged(log, history):
     question = "Did every solve converge?"
-    said = log.value("converged")
+    said = log.convergence if log.end()[0] else ""
     if said:
         return Answer(question, BAD if said.startswith("NO") else GOOD, said[0].upper() + said[1:] + ".")
     if "converged" not in history or len(history) == 0:

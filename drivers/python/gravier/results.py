@@ -1,5 +1,4 @@
 """What a run left in its directory, as numpy arrays."""
-import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from .case import CaseError, entries, parse_namelist
 from .checksum import is_whole
+from .run_words import verdict
 from .shapes import axes_of, ball, shapes_of
 from .tables import ResultsError, Table, one_line, read_table
 
@@ -290,18 +290,13 @@ class Run:
         return found
 
     def verdict(self):
-        """The last words of run.log: 'converged', 'not converged', 'converged only by' another criterion than the velocity error, or 'not finished'."""
+        """What run.log says of the whole run, restarts with it: 'converged', 'not converged', 'converged only by' another criterion than the velocity
+        error, or 'not finished'."""
         try:
             text = (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
         except OSError as reason:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
-        # that of the last start
-        lines = re.split(r"^Gravier \S+ \(", text, flags=re.M)[-1].splitlines()
-        said = next((line.split(None, 1)[1] for line in reversed(lines) if line.startswith("converged ")), "")
-        if not any(line.startswith("finished ") for line in lines):
-            return "not finished"
-        # without a step there is nothing to say
-        return {"yes": "converged", "NO": "not converged", "": "converged"}.get(said.split(":")[0], "converged only by")
+        return verdict(text)
 
     def history(self):
         """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""
