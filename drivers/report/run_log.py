@@ -36,6 +36,10 @@ class RunLog:
         last = max((k for k, line in enumerate(inside) if line == "  /"), default=first - 1)
         return gravier.parse_namelist("\n".join(inside[first:last + 1]))
 
+    def is_idle(self):
+        """Whether this is the log of a restart that had no step left to make."""
+        return any(line.startswith("warning     no step is left to make") for line in self.lines)
+
     def warnings(self):
         """Lines that warn, what the closing line counts, with misses of solves, and what a loop has set in the place of keys."""
         return [line.strip() for line in self.lines if line.startswith(("warning ", "loop ")) or line.lstrip().startswith("***")]

@@ -62,7 +62,20 @@ def converged(log, history):
     return Answer(question, GOOD, "Yes, the only solve so far." if len(history) == 1 else f"Yes, all {len(history)} solves so far.")
 
 
-def accurate(log, history, solver):
+def goals_of(solvers):
+    """First steps and accuracies, where they differ from those before; infinite where another criterion ends the solves. `solvers` are the first steps and
+    the keys of &solver of the starts of a run."""
+    found = []
+    for first, solver in solvers:
+        goal = number(solver, "accuracy", 0.1) if solver.get("criterion", "velocity_error") == "velocity_error" else numpy.inf
+        if not found or goal != found[-1][1]:
+            found.append((first, goal))
+    return found
+
+
+def accurate(log, history, solvers):
+    """Whether each step has the accuracy that was asked for in it."""
+    solver = solvers[-1][1]
     question = "Was the accuracy reached?"
     if "velocity_error" not in history or len(history) == 0:
         said = re.match(r"velocity error at most (\S+) of U", log.value("accuracy"))
@@ -77,16 +90,20 @@ def accurate(log, history, solver):
     worst = float(numpy.nanmax(ratio))
     words = f"the velocity error was at most {worst:.2g} of U, the velocity that a step is judged by"
     if solver.get("criterion", "velocity_error") == "velocity_error":
-        goal = number(solver, "accuracy", 0.1)
+        goals = goals_of(solvers)
+        words += ", with a goal of " + ", ".join(f"{goal:g}" + (f" from step {first} on" if first > 0 else "") for first, goal in goals)
+        goal = numpy.full(len(ratio), goals[-1][1])
+        for first, value in goals if len(history) > 0 else ():
+            goal[history.step >= first] = value
         # the criterion weighs the error, so that the estimate may be a little above
-        reached = worst <= goal * (1.0 + 1e-6)
+        reached = not (ratio > goal * (1.0 + 1e-6)).any()
         if "converged" in history and (history.converged == 0).any():
-            missed, above = int((history.converged == 0).sum()), int((ratio[history.converged == 0] > goal).sum())
+            missed, above = int((history.converged == 0).sum()), int((ratio > goal)[history.converged == 0].sum())
             beside = "" if above == missed else f", and in {missed - above} more what else the criterion asks for was missed"
-            return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}. It was above this goal in {counted(above, 'step')}{beside}.")
+            return Answer(question, BAD, f"Not in every step: {words}. It was above this goal in {counted(above, 'step')}{beside}.")
         if log.value("drift"):
-            return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}, with a goal of {goal:g}; {log.value('drift')}.")
-        return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}, with a goal of {goal:g}.")
+            return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}; {log.value('drift')}.")
+        return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}.")
     grade = GOOD if worst <= 0.1 else DOUBT if worst <= FAR_OFF else BAD
     return Answer(question, grade, f"The criterion '{solver.get('criterion')}' does not bound it; as estimated, {words}.")
 
@@ -177,11 +194,11 @@ def error_ratio(history):
     return numpy.where(ratio < 1e6, ratio, numpy.nan)
 
 
-def answers(log, history, options, notes):
-    """Answers to all questions of a run; `notes` name files that are missing or damaged."""
-    solver = (options.get("solver") or [{}])[0]
+def answers(log, history, options, notes, solvers):
+    """Answers to all questions of a run; `notes` name files that are missing or damaged, `solvers` are the first steps and the keys of &solver of its
+    starts."""
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(log, history, solver), projected(log, history), *too_fast(history), *balanced(log),
+    return [ended(log, history, steps), converged(log, history), accurate(log, history, solvers), projected(log, history), *too_fast(history), *balanced(log),
             *readable(notes)]
 
 
