@@ -2,6 +2,7 @@
 import re
 
 import numpy
+from one_line import counted
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
@@ -30,11 +31,6 @@ def number(keys, name, usual):
 
 def percent(share):
     return "none" if share == 0.0 else "less than 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
-
-
-def counted(number_of, word):
-    """A number with its word: 1 step, 2 steps."""
-    return f"{number_of} {word}" if number_of == 1 else f"{number_of} {word}s"
 
 
 def ended(log, history, steps):
