@@ -22,7 +22,7 @@ except ImportError as missing:
     sys.exit(f"gravier_import: error: {missing}: expected a python3 with h5py and numpy (apt install python3-h5py)")
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
-from one_line import OneLineParser, plain, run_tool  # noqa: E402
+from one_line import OneLineParser, counted, plain, run_tool  # noqa: E402
 from whole_file import Locked, output_lock  # noqa: E402
 from case_files import write_files  # noqa: E402
 from datbox import read_bodies, read_bulk, read_contacts, read_initial, read_laws  # noqa: E402
@@ -119,7 +119,8 @@ def main():
         return 4
     for remark in dict.fromkeys(case.remarks):
         print(f"gravier_import: note: {plain(remark)}", file=sys.stderr)
-    print(f"{len(case.free)} grains, {len(case.boundaries)} boundaries" + (f", {len(contacts)} contacts" if contacts is not None else "")
+    boundaries = "1 boundary" if len(case.boundaries) == 1 else f"{len(case.boundaries)} boundaries"
+    print(f"{counted(len(case.free), 'grain')}, {boundaries}" + (f", {counted(len(contacts), 'contact')}" if contacts is not None else "")
           + f": {', '.join(made)}")
     return 0
 

@@ -217,7 +217,7 @@ def draw_convergence(runs, step):
             if (values > 0.0).any():
                 axes.plot(trace.iteration[chosen], numpy.where(values > 0.0, values, numpy.nan), styles[name],
                           color=LINES[k % len(LINES)], linewidth=1.2, label=begin + name)
-        tolerance = run.case.get("solver", [{}])[0].get("tolerance")
+        tolerance = run.case_at(drawn).get("solver", [{}])[0].get("tolerance")
         if tolerance is not None:
             axes.axhline(tolerance, color=LINES[k % len(LINES)], linewidth=0.6, label=begin + "tolerance")
     axes.set(xlabel=f"iteration of step {drawn:.0f}" if len(runs) == 1 else "iteration", ylabel="residual, jump, velocity error / U",

@@ -52,7 +52,7 @@ def error_speeds(run):
     history = run.history()
     if "velocity_scale" not in history:
         return {}
-    accuracy = run.case.get("solver", [{}])[0].get("accuracy", 0.1)
+    accuracy = [run.case_at(step).get("solver", [{}])[0].get("accuracy", 0.1) for step in history.step]
     return dict(zip(history.step.astype(int), accuracy * history.velocity_scale))
 
 
@@ -76,7 +76,7 @@ def spread(values, kind, least=0.0):
 def kinds(run, step, bodies, kind):
     """Numbers to colour bodies by, from 1, and the names of all of them."""
     if kind == "subdomain":
-        values, asked = run.subdomain(step), run.case.get("decomposition", [{}])[0]
+        values, asked = run.subdomain(step), run.case_at(step).get("decomposition", [{}])[0]
         # a subdomain without a body has its colour, too
         count = int(asked.get("subdomains", numpy.prod(gravier.entries(asked, "grid", numpy.ones(run.dimension)))))
         return values, [str(number) for number in range(1, max(count, values.max()) + 1)]
@@ -204,7 +204,7 @@ def cell_corners(run, step):
 
 def points_of(run, step, options):
     """Points that a picture must hold beside bodies and walls: corners of a moving cell, and of regions on request."""
-    return numpy.concatenate([cell_corners(run, step), region_corners(run.case, run.dimension) if options.regions else numpy.zeros((0, run.dimension))])
+    return numpy.concatenate([cell_corners(run, step), region_corners(run.case_at(step), run.dimension) if options.regions else numpy.zeros((0, run.dimension))])
 
 
 # ---- a picture

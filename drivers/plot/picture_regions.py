@@ -52,7 +52,7 @@ def draw_regions(axes, run, step, view, low, high):
     the ends of a scene that is not periodic. There end those without a side that no means tell of."""
     dimension = len(low)
     low, high = numpy.where(run.period > 0.0, run.origin, low), numpy.where(run.period > 0.0, run.origin + run.period, high)
-    for keys in run.case.get("region", []):
+    for keys in run.case_at(step).get("region", []):
         name = keys.get("name", "")
         if name in run.regions(step):
             rows = run.region(name, step)

@@ -16,6 +16,11 @@ def plain(text):
     return "".join("?" if unicodedata.category(letter) == "Cc" else letter for letter in str(text).replace("\n", " "))
 
 
+def counted(number, word):
+    """A number with its word: 1 step, 2 steps."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
 class OneLineParser(argparse.ArgumentParser):
     """An ArgumentParser that does not print its usage before an error."""
 

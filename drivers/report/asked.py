@@ -5,6 +5,7 @@ import subprocess
 
 import gravier
 from gravier.case import ENVIRONMENT, find_program
+from gravier.starts import changed_keys
 
 
 def key_reference(program=None):
@@ -58,3 +59,13 @@ def asked_rows(groups, reference):
                 elif key != "name":
                     rows.append((title, key, shown_value(value), unit, default.replace("`", ""), meaning.replace("`", "")))
     return rows, usual
+
+
+def changed_rows(starts, reference):
+    """Rows (first step, group, key, value before, value from that step on) of the restarts of a run that changed keys. A key that is not given has its
+    default."""
+    def value(title, key, given):
+        default = reference.get((title.split()[0][1:], key.split("(")[0]), ("", "", ""))[1].replace("`", "")
+        return shown_value(given) if given is not None else f"not given{f' ({default})' if default else ''}"
+    return [(str(after.step), title, key, value(title, key, old), value(title, key, new)) for before, after in zip(starts, starts[1:])
+            for title, key, old, new in changed_keys(before.case, after.case)]

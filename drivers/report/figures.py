@@ -10,7 +10,7 @@ import numpy
 from curve_pictures import Panel, draw_panels, draw_profile, label_of
 from packing_picture import draw_packing, shared_frame
 from picture_style import PictureError
-from verdict import error_ratio, number
+from verdict import error_ratio, goals_of, number
 
 import gravier
 
@@ -46,11 +46,11 @@ def panel(history, label, columns, goals=(), counts=False, places=False):
 
 # ---- curves
 
-def accuracy_panels(history, solver):
-    """Velocity error, residual, iterations and overlaps, with what was asked for."""
-    panels, criterion = [], solver.get("criterion", "velocity_error")
+def accuracy_panels(history, solvers):
+    """Velocity error, residual, iterations and overlaps, with what was asked for from the first steps of `solvers` on."""
+    panels, (_, solver) = [], solvers[-1]
     if "velocity_error" in history and numpy.isfinite(error_ratio(history)).any():
-        goals = [(number(solver, "accuracy", 0.1), "goal")] if criterion == "velocity_error" else []
+        goals = [(goal, f"goal from step {first} on" if first > 0 else "goal") for first, goal in goals_of(solvers) if numpy.isfinite(goal)]
         panels.append(panel(history, "velocity error / U", [(None, error_ratio(history))], goals))
     if "residual" in history:
         tolerance = number(solver, "tolerance", None)
@@ -102,9 +102,9 @@ def boundary_panels(history):
     return panels
 
 
-def curve_groups(history, solver, dimension):
+def curve_groups(history, solvers, dimension):
     """Titles and pictures of all curves that the run has."""
-    groups = (("Accuracy and iterations of each step", accuracy_panels(history, solver)), ("Energies and contacts", motion_panels(history)),
+    groups = (("Accuracy and iterations of each step", accuracy_panels(history, solvers)), ("Energies and contacts", motion_panels(history)),
               ("Stress and solid fraction", stress_panels(history, dimension)), ("Boundaries", boundary_panels(history)))
     return [(title, picture(draw_panels(panels, width=7.2, height=1.5), f"{title}, against time: " + ", ".join(one.label for one in panels)))
             for title, panels in groups if panels]

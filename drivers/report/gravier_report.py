@@ -18,7 +18,7 @@ except ImportError as missing:
 import figures  # noqa: E402
 import page  # noqa: E402
 import verdict  # noqa: E402
-from asked import asked_rows, key_reference  # noqa: E402
+from asked import asked_rows, changed_rows, key_reference  # noqa: E402
 from one_line import OneLineParser, plain, run_tool  # noqa: E402
 from run_log import STATUSES, RunLog  # noqa: E402
 from whole_file import claim, written  # noqa: E402
@@ -81,12 +81,18 @@ class Folder:
         return self.run.case if self.run else self.log.options()
 
     def options(self):
-        """Keys in force, or those of the case where the log does not have them."""
-        return self.log.options() or self.groups()
+        """Keys in force, or those of the case where the log does not have them, or is that of a restart without a step."""
+        return self.groups() if self.run and self.log.is_idle() else self.log.options() or self.groups()
+
+    def solvers(self):
+        """First steps and keys of &solver of the starts of the run."""
+        starts = self.run.starts[:-1] if self.run else []
+        last = (self.run.starts[-1].step if self.run else 0, (self.options().get("solver") or [{}])[0])
+        return [(start.step, (start.case.get("solver") or [{}])[0]) for start in starts] + [last]
 
 
 def verdict_section(folder):
-    log, found = folder.log, verdict.answers(folder.log, folder.history, folder.options(), folder.notes)
+    log, found = folder.log, verdict.answers(folder.log, folder.history, folder.options(), folder.notes, folder.solvers())
     grade, sentence = verdict.headline(found, log)
     status = log.status()
     below = f"Exit status {status} by its last words: {page.text(STATUSES[status])}." if status is not None else "There is no exit status to tell of."
@@ -101,7 +107,7 @@ def asked_section(folder):
     facts = [(name, log.value(word)) for name, word in (("Case", "case"), ("Ranks", "ranks"), ("Bodies", "bodies"), ("Effects", "effects"))]
     facts += [("Program", "; ".join(log.version()))]
     if folder.run:
-        facts += [("Command", folder.run.command)]
+        facts += [("Command" if start.step == 0 else f"From step {start.step} on", start.command) for start in folder.run.starts]
     if log.restarts:
         facts += [("Restarts", f"{log.restarts}; what the log says of the end is since the last one")]
     facts += [("Last written", folder.written)]
@@ -117,15 +123,19 @@ def asked_section(folder):
                       *(page.text(cell) for cell in row[3:])][:len(head)])
     more = f"; {usual} more are given and have theirs" if usual else ""
     note = f"Keys whose values are not the defaults{more}." if reference else "Keys of the case."
-    return page.table([], rows, "facts") + f'<p class="soft">{note}</p>' + page.table(head, cells, "keys")
+    changed = [[("number", page.text(step)), *(("key", f"<code>{page.text(cell)}</code>") for cell in cells_of)]
+               for step, *cells_of in changed_rows(folder.run.starts if folder.run else [], reference)]
+    if changed:
+        note = note[:-1] + ", as they are at the end; restarts have changed some."
+    restarts = page.table(["from step", "group", "key", "before", "then"], changed, "changes") if changed else ""
+    return page.table([], rows, "facts") + f'<p class="soft">{note}</p>' + page.table(head, cells, "keys") + restarts
 
 
 def curves_section(folder):
     if len(folder.history) == 0:
         return "<p>history.csv has no step.</p>"
     dimension = folder.run.dimension if folder.run else int(verdict.number((folder.options().get("scene") or [{}])[0], "dimension", 2))
-    solver = (folder.options().get("solver") or [{}])[0]
-    groups = figures.curve_groups(folder.history, solver, dimension)
+    groups = figures.curve_groups(folder.history, folder.solvers(), dimension)
     return "".join(page.figure(title, image) for title, image in groups)
 
 

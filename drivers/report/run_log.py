@@ -2,6 +2,7 @@
 import re
 
 import gravier
+from gravier.run_words import convergence, said_of, starts_of
 
 #: exit statuses as the program documents them
 STATUSES = {0: "done, every solve converged", 3: "a solve did not converge", 4: "the run was interrupted, or an error ended it"}
@@ -15,14 +16,14 @@ class RunLog:
     """The log of a run; after restarts, the part since the last one and the number of them."""
 
     def __init__(self, text):
-        begins = [match.start() for match in re.finditer(r"^Gravier \S+ \(", text, re.M)]
-        self.restarts = max(0, len(begins) - 1)
-        self.lines = text[begins[-1] if begins else 0:].splitlines()
+        starts = starts_of(text)
+        self.restarts, self.lines = len(starts) - 1, starts[-1]
+        #: what the log says of convergence over all starts
+        self.convergence = convergence(text)
 
     def value(self, word):
         """What follows the last line that begins with a word; empty where there is none."""
-        found = [line for line in self.lines if re.match(rf"{re.escape(word)}\s", line)]
-        return found[-1][len(word):].strip() if found else ""
+        return said_of(self.lines, word)
 
     def version(self):
         """The program and the libraries, a line each."""
@@ -34,6 +35,10 @@ class RunLog:
         first = next((k for k, line in enumerate(inside) if line.startswith("  &")), len(inside))
         last = max((k for k, line in enumerate(inside) if line == "  /"), default=first - 1)
         return gravier.parse_namelist("\n".join(inside[first:last + 1]))
+
+    def is_idle(self):
+        """Whether this is the log of a restart that had no step left to make."""
+        return any(line.startswith("warning     no step is left to make") for line in self.lines)
 
     def warnings(self):
         """Lines that warn, what the closing line counts, with misses of solves, and what a loop has set in the place of keys."""

@@ -2,6 +2,7 @@
 import re
 
 import numpy
+from one_line import counted
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
@@ -32,11 +33,6 @@ def percent(share):
     return "none" if share == 0.0 else "less than 1 %" if share < 0.01 else f"{100.0 * share:.0f} %"
 
 
-def counted(number_of, word):
-    """A number with its word: 1 step, 2 steps."""
-    return f"{number_of} {word}" if number_of == 1 else f"{number_of} {word}s"
-
-
 def ended(log, history, steps):
     made = int(history.step[-1]) if len(history) > 0 else log.last_step(steps)
     made = f"{'?' if made is None else made} of {'? steps' if steps is None else counted(steps, 'step')}"
@@ -51,7 +47,7 @@ def ended(log, history, steps):
 
 def converged(log, history):
     question = "Did every solve converge?"
-    said = log.value("converged")
+    said = log.convergence if log.end()[0] else ""
     if said:
         return Answer(question, BAD if said.startswith("NO") else GOOD, said[0].upper() + said[1:] + ".")
     if "converged" not in history or len(history) == 0:
@@ -62,7 +58,20 @@ def converged(log, history):
     return Answer(question, GOOD, "Yes, the only solve so far." if len(history) == 1 else f"Yes, all {len(history)} solves so far.")
 
 
-def accurate(log, history, solver):
+def goals_of(solvers):
+    """First steps and accuracies, where they differ from those before; infinite where another criterion ends the solves. `solvers` are the first steps and
+    the keys of &solver of the starts of a run."""
+    found = []
+    for first, solver in solvers:
+        goal = number(solver, "accuracy", 0.1) if solver.get("criterion", "velocity_error") == "velocity_error" else numpy.inf
+        if not found or goal != found[-1][1]:
+            found.append((first, goal))
+    return found
+
+
+def accurate(log, history, solvers):
+    """Whether each step has the accuracy that was asked for in it."""
+    solver = solvers[-1][1]
     question = "Was the accuracy reached?"
     if "velocity_error" not in history or len(history) == 0:
         said = re.match(r"velocity error at most (\S+) of U", log.value("accuracy"))
@@ -77,16 +86,20 @@ def accurate(log, history, solver):
     worst = float(numpy.nanmax(ratio))
     words = f"the velocity error was at most {worst:.2g} of U, the velocity that a step is judged by"
     if solver.get("criterion", "velocity_error") == "velocity_error":
-        goal = number(solver, "accuracy", 0.1)
+        goals = goals_of(solvers)
+        words += ", with a goal of " + ", ".join(f"{goal:g}" + (f" from step {first} on" if first > 0 else "") for first, goal in goals)
+        goal = numpy.full(len(ratio), goals[-1][1])
+        for first, value in goals if len(history) > 0 else ():
+            goal[history.step >= first] = value
         # the criterion weighs the error, so that the estimate may be a little above
-        reached = worst <= goal * (1.0 + 1e-6)
+        reached = not (ratio > goal * (1.0 + 1e-6)).any()
         if "converged" in history and (history.converged == 0).any():
-            missed, above = int((history.converged == 0).sum()), int((ratio[history.converged == 0] > goal).sum())
+            missed, above = int((history.converged == 0).sum()), int((ratio > goal)[history.converged == 0].sum())
             beside = "" if above == missed else f", and in {missed - above} more what else the criterion asks for was missed"
-            return Answer(question, BAD, f"Not in every step: {words}, with a goal of {goal:g}. It was above this goal in {counted(above, 'step')}{beside}.")
+            return Answer(question, BAD, f"Not in every step: {words}. It was above this goal in {counted(above, 'step')}{beside}.")
         if log.value("drift"):
-            return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}, with a goal of {goal:g}; {log.value('drift')}.")
-        return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}, with a goal of {goal:g}.")
+            return Answer(question, DOUBT, f"Yes, but the motion may be nothing but errors: {words}; {log.value('drift')}.")
+        return Answer(question, GOOD if reached else DOUBT, f"{'Yes' if reached else 'Nearly'}: {words}.")
     grade = GOOD if worst <= 0.1 else DOUBT if worst <= FAR_OFF else BAD
     return Answer(question, grade, f"The criterion '{solver.get('criterion')}' does not bound it; as estimated, {words}.")
 
@@ -177,11 +190,11 @@ def error_ratio(history):
     return numpy.where(ratio < 1e6, ratio, numpy.nan)
 
 
-def answers(log, history, options, notes):
-    """Answers to all questions of a run; `notes` name files that are missing or damaged."""
-    solver = (options.get("solver") or [{}])[0]
+def answers(log, history, options, notes, solvers):
+    """Answers to all questions of a run; `notes` name files that are missing or damaged, `solvers` are the first steps and the keys of &solver of its
+    starts."""
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(log, history, solver), projected(log, history), *too_fast(history), *balanced(log),
+    return [ended(log, history, steps), converged(log, history), accurate(log, history, solvers), projected(log, history), *too_fast(history), *balanced(log),
             *readable(notes)]
 
 

@@ -12,6 +12,7 @@ module gravier_sample_preparation
   use gravier_load_areas, only: facing_area
   use gravier_scene_extent, only: find_extent
   use gravier_contact_kernels, only: lane_of, block_of
+  use gravier_contact_structure, only: carrying_neighbours
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_run_log, only: run_log_t
   use gravier_sample_place, only: sample_program, open_log
@@ -202,17 +203,19 @@ contains
 
   !> What the sample is like. Collective.
   subroutine write_summary(simulation, log, rest, error)
-    type(simulation_t), intent(in) :: simulation
+    type(simulation_t), intent(inout) :: simulation
     type(run_log_t), intent(inout) :: log
     type(rest_t), intent(in) :: rest
     type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: fraction
+    character(len=:), allocatable :: fraction, points
     integer :: b
 
     fraction = ""
+    points = ""
+    if (simulation%effects%shapes) points = " ("//fixed(contacts_per_grain(simulation), 3)//" points of contact a grain)"
     if (simulation%config%sample%container == "box") fraction = ", solid fraction "//fixed(solid_fraction(simulation), 4)
-    call log%line("sample      "//to_text(simulation%n_grains)//" grains"//fraction//", contacts per grain "// &
-      & fixed(contacts_per_grain(simulation), 3)//", largest overlap "// &
+    call log%line("sample      "//to_text(simulation%n_grains)//" grains"//fraction//", coordination "// &
+      & fixed(carrying_neighbours(simulation%problem, simulation%halo, simulation%n_grains), 3)//points//", largest overlap "// &
       & fixed(rest%overlap/simulation%decomposition%rule%mean_radius, 4)//" mean radii"// &
       & trim(merge(" of rigid contacts", "                  ", simulation%physics%laws%yields))//", "// &
       & to_text(simulation%step)//" steps", error)
@@ -309,7 +312,7 @@ contains
 
   end function solid_fraction
 
-  !> Mean number of contacts of a grain that bear an impulse. Collective.
+  !> Mean number of points of contact of a grain that bear an impulse. Collective.
   real(dp) function contacts_per_grain(simulation)
     type(simulation_t), intent(in) :: simulation
     integer(i8) :: ends

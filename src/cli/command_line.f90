@@ -77,6 +77,9 @@ contains
     end do
     if (arguments%action <= action_check .and. arguments%file == "") &
       & call raise(error, status_input, "no input file; see gravier --help")
+    if (arguments%action == action_check .and. arguments%restart) call raise(error, status_input, &
+      & "--check beside --restart: --check looks at a run from its beginning, and what a restart refuses it refuses before it "// &
+      & "changes a file; expected one of the two")
     if (arguments%action == action_keys .and. arguments%file /= "") call raise(error, status_input, &
       & "an input file, "//arguments%file//", beside --keys, which shows the keys of every input file; see gravier --help")
   end subroutine read_arguments

@@ -6,7 +6,8 @@ module gravier_results_output
   use gravier_diagnostic, only: histogram_t
   use gravier_diagnostics, only: diagnostics_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, provenance_t, figures_t, accuracy_t
+  use gravier_results_file, only: results_file_t, figures_t, accuracy_t
+  use gravier_run_provenance, only: provenance_t
   use gravier_build_info, only: version
   use gravier_config_types, only: config_t
   use gravier_simulation, only: simulation_t, step_figures_t
@@ -64,16 +65,20 @@ contains
 
     self%stage = of_states
     self%schedule = schedule_t(every=simulation%config%output%every, last=simulation%config%time%steps)
+    run%version = version
+    run%command = command
+    run%input_text = simulation%config%text
     if (simulation%restarted) then
       self%last = simulation%last_written
-      call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error)
+      if (simulation%step < simulation%config%time%steps) then
+        call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error, run)
+      else
+        call self%file%reopen(simulation%comm, directory//"results.h5", simulation%step, "bodies/radius", error)
+      end if
       ! a run that ended in the step of its checkpoint has written this state
       if (self%file%has_last) self%last = simulation%step
       return
     end if
-    run%version = version
-    run%command = command
-    run%input_text = simulation%config%text
     run%dimension = simulation%config%scene%dimension
     run%period(:) = simulation%decomposition%period%length
     run%origin(:) = simulation%decomposition%period%origin

@@ -435,7 +435,8 @@ contains
       ! a contact that sends bodies back begins at the first overlap that a step finds
       if (simulation%effects%restitution) &
         & text = "bodies that rebound overlap by up to their way in a step before they do, and "//text
-      if (simulation%largest_overlap <= simulation%tally%start_overlap) text = "there were as large ones at the start"
+      if (simulation%largest_overlap <= simulation%tally%start_overlap) text = "there were as large ones in the middle of "// &
+        & "the first step, which come from the places and the velocities of the start"
       call log%line("warning     overlaps of up to "//to_text(simulation%largest_overlap, 3)//" m, far beyond the "// &
         & "overlap_allowed of "//to_text(simulation%overlap_allowed, 3)//" m: "//text, error)
     end if

@@ -340,7 +340,7 @@ def state(results):
     found = {}
     for name in ("results.h5", "checkpoint.h5", "final_bodies.h5", "step_20.hdf5"):
         found.update({f"{name} {key}": value for key, value in contents(os.path.join(results, name)).items()
-                      if not key.startswith("/run@")})
+                      if not key.startswith(("/run/", "/run@"))})
     for name in ("history", "trace"):
         rows = read_csv(os.path.join(results, f"{name}.csv"))
         found.update({f"{name} {key}": value for key, value in rows.items() if not key.endswith("_seconds")})
@@ -418,7 +418,7 @@ def at_once(random_seed, trials, directory):
 
 def kept(results):
     """What results and history hold, but for times on the clock and what says how the run was started."""
-    found = {key: value for key, value in contents(os.path.join(results, "results.h5")).items() if not key.startswith("/run@")}
+    found = {key: value for key, value in contents(os.path.join(results, "results.h5")).items() if not key.startswith(("/run/", "/run@"))}
     rows = read_csv(os.path.join(results, "history.csv"))
     found.update({f"history {key}": value for key, value in rows.items() if not key.endswith("_seconds")})
     return found

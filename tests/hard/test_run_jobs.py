@@ -123,6 +123,77 @@ class Jobs(RunTestCase):
         done = self.sh("gravier_job", "odd_1.nml", GRAVIER_MARGIN="abc")
         self.assertEqual((done.returncode, done.stderr), (2, "gravier_job: error: GRAVIER_MARGIN=abc: expected seconds, 0 or more\n"))
 
+    def test_runs_that_have_ended_stay(self):
+        """A run that has ended is kept when its job is run again: its log stays, with its status. It is made anew where its case, a file of its case or
+        its results have changed, and with --fresh."""
+        case = namelist({**CASE, "time": {"step": 1e-3, "steps": 60}, "solver": {"max_iterations": 3, "fallback": "none"}, "decomposition": {},
+                         "scene": {"dimension": 2, "bodies": "file", "bodies_file": "disks.csv", "friction": "@mu@"},
+                         "boundary": [{"name": "floor", "shape": "plane", "normal": [0.0, 1.0]}],
+                         "output": {"directory": "@run@", "every": 0, "checkpoint_every": 60}}).replace("'@mu@'", "@mu@")
+        write(os.path.join(self.work, "kept.nml"), case)
+        write(os.path.join(self.work, "kept.csv"), "mu\n0.3\n0.4\n")
+        disks = "id,x,y,radius\n" + "".join(f"{k + 1},{0.021 * (k % 6)},{0.012 + 0.021 * (k // 6)},0.01\n" for k in range(36))
+        write(os.path.join(self.work, "disks.csv"), disks)
+        log = [os.path.join(self.work, f"kept_{k}", "run.log") for k in (1, 2)]
+
+        def logs():
+            found = []
+            for path in log:
+                with open(path, encoding="utf-8") as file:
+                    found.append(file.read())
+            return found
+        job = ("gravier_job", "--list", "kept.csv", "kept.nml")
+        done = self.sh(*job)
+        self.assertEqual(done.returncode, 3, done.stderr)
+        first = logs()
+        done = self.sh(*job)
+        self.assertEqual(done.returncode, 3)
+        self.assertRegex(done.stderr, r"^gravier_job: kept_1: stays as it is: it has ended with this case: \*\*\* \d+ of the steps .*; results in kept_1; "
+                                      r"--fresh runs it again\ngravier_job: kept_2: stays .*\n$")
+        self.assertEqual(logs(), first)
+        # another friction; a run whose results are gone, which has no checkpoint either
+        write(os.path.join(self.work, "kept.csv"), "mu\n0.3\n0.5\n")
+        shutil.rmtree(os.path.join(self.work, "kept_2"))
+        done = self.sh(*job)
+        self.assertIn("kept_1: stays", done.stderr)
+        self.assertNotIn("kept_2: stays", done.stderr)
+        second = logs()
+        self.assertEqual(second[0], first[0])
+        self.assertIn("friction = 0.5", second[1])
+        shutil.rmtree(os.path.join(self.work, "kept_1"))
+        self.assertNotIn("kept_1: stays", self.sh(*job).stderr)
+        # a file of the case
+        later = time.time() + 5
+        os.utime(os.path.join(self.work, "disks.csv"), (later, later))
+        self.assertNotIn("stays", self.sh(*job).stderr)
+        os.utime(os.path.join(self.work, "disks.csv"), (1e9, 1e9))
+        self.assertEqual(self.sh(*job).stderr.count("stays"), 2)
+        done = self.sh("gravier_job", "--fresh", *job[1:])
+        self.assertNotIn("stays", done.stderr)
+        for text in logs():
+            self.assertEqual(text.count("\nfinished "), 1, "a fresh run goes on from no checkpoint, in no row")
+
+    def test_a_signal_to_the_job(self):
+        """SIGTERM to the job stops the ranks, which write a checkpoint; the job ends after them, and no further row runs."""
+        write(os.path.join(self.work, "long.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 1000000}, "output": {"directory": "@run@", "every": 0}})
+              .replace("friction = 0.3", "friction = @mu@"))
+        write(os.path.join(self.work, "long.csv"), "mu\n0.3\n0.4\n")
+        for ranks in (1, 2):
+            shutil.rmtree(os.path.join(self.work, "long_1"), ignore_errors=True)
+            job = subprocess.Popen(["gravier_job", "--ranks", str(ranks), "--list", "long.csv", "long.nml"], cwd=self.work, stderr=subprocess.PIPE, text=True,
+                                   env={**ENVIRONMENT, **os.environ, "PATH": f"{self.bin}:{PROGRAMS}:{os.environ['PATH']}"})
+            history, began = os.path.join(self.work, "long_1", "history.csv"), time.time()
+            while not (os.path.exists(history) and os.path.getsize(history) > 2000) and time.time() - began < PATIENCE:
+                time.sleep(0.05)
+            job.terminate()
+            _, said = job.communicate(timeout=PATIENCE)
+            self.assertEqual(job.returncode, 143, said)
+            self.assertRegex(said, r"^gravier_job: long_1: ended by SIGTERM: interrupted \*\*\* by SIGTERM after step \d+ of 1000000")
+            self.assertTrue(os.path.exists(os.path.join(self.work, "long_1", "checkpoint.h5")))
+            self.assertFalse(os.path.exists(os.path.join(self.work, "long_2")))
+            with open(os.path.join(self.work, "long_1", "run.log"), encoding="utf-8") as file:
+                self.assertIn("interrupted ***", file.read().splitlines()[-1])
+
     def test_samples_of_a_list(self):
         """The samples of a list, one after the other; of one that is refused the error is said."""
         write(os.path.join(self.work, "grades.csv"), "count,fraction\n20,0.3\n30,0.3\n20,5.0\n")

@@ -115,6 +115,7 @@ class Import(RunTestCase):
             done = script(IMPORT, box, "--step", step, "--steps", steps, "--out", "case", *options, directory=folder,
                           environment={**environment, **variables})
         self.assertEqual(done.returncode, status, done.stdout + done.stderr)
+        self.assertNotRegex(done.stdout, r"\b1 (grains|boundaries|contacts)\b")
         self.assertEqual("is not checked" in done.stderr, "GRAVIER_PROGRAM" in variables)
         return folder, done.stderr
 

@@ -235,7 +235,7 @@ class Report(RunTestCase):
                                      (1, 2, "It was above this goal in 1 step, and in 1 more what else the criterion asks for was missed.")):
             step = np.arange(1, 5)
             history = gravier.results.Table(step=step, velocity_error=np.where(step <= above, 2e-3, 1e-4), velocity_scale=np.full(4, 1e-2), converged=step > missed)
-            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n"), history, {})
+            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n"), history, [(0, {})])
             self.assertEqual(answer.grade, "bad")
             self.assertTrue(answer.text.endswith(words), answer.text)
 
@@ -244,7 +244,7 @@ class Report(RunTestCase):
         history = gravier.results.Table(step=np.arange(1, 5), velocity_error=np.full(4, 1e-4), velocity_scale=np.full(4, 1e-2), converged=np.ones(4))
         said = "in 4 of 4 steps bodies moved no faster than twice the velocity error of the solve, and came 0.42 mean diameters away as a whole"
         for text, grade in (("", "good"), (f"drift       {said}\n            that motion may be nothing but errors\n", "doubt")):
-            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n" + text), history, {})
+            answer = verdict.accurate(RunLog("Gravier 0.1.0 (a), dense\n" + text), history, [(0, {})])
             self.assertEqual(answer.grade, grade, answer.text)
             self.assertEqual(said in answer.text, grade == "doubt")
 

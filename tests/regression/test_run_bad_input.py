@@ -643,6 +643,7 @@ class BadInput(RunTestCase):
         cases = [((), ("no input file", "--help")),
                  (("--check",), ("no input file",)),
                  (("case.nml", "other.nml"), ("more than one input file", "case.nml and other.nml", "expected one")),
+                 (("--check", "--restart", "case.nml"), ("--check beside --restart",)),
                  (("--keys", "case.nml"), ("an input file, case.nml, beside --keys",)),
                  (("--frobnicate", "case.nml"), ("unknown option --frobnicate", "--help")),
                  (("case.nml", "-n", "2"), ("unknown option -n",)),

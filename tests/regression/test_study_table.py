@@ -1,8 +1,12 @@
 """gravier.study: a run for every combination of values, and the table of its runs."""
 import csv
 import math
+import os
 import pathlib
+import shutil
+import time
 import unittest
+import warnings
 
 import gravier_runs  # noqa: F401  puts the package on the path
 from gravier_runs import RunTestCase
@@ -125,6 +129,48 @@ class Study(RunTestCase):
                                 "results of run_2: columns seed 2; expected those of the runs before, seed 1")):
             with self.assertRaisesRegex(gravier.CaseError, words):
                 list(gravier.study(base, {("scene", "seed"): [1, 2], ("time", "steps"): [1]}, self.here("odd"), results=results))
+
+    def test_runs_that_have_ended_stay(self):
+        """A study that was stopped goes on: runs that have ended with their case stay, and their rows are those of before."""
+        base = {"scene": {"bodies": "file", "bodies_file": "../../disk.csv"}, "boundary": [GROUND], "time": {"step": 1e-3, "steps": 20},
+                "output": {"directory": "out", "every": 0}}
+        pathlib.Path(self.here("disk.csv")).write_text("id,x,y,radius\n1,0.0,0.01,0.01\n")
+        changes, place = {("scene", "friction"): [0.1, 0.2, 0.3]}, pathlib.Path(self.here("stopped"))
+
+        def logs():
+            return [(place / f"run_{number}/out/run.log").stat().st_mtime_ns for number in (1, 2, 3) if (place / f"run_{number}/out/run.log").exists()]
+
+        def runs(words=None, **more):
+            """Run numbers of a study with their status; it warns in these words."""
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                found = [(place.name, status) for _, place, status in gravier.study(base, changes, place, **more)]
+            self.assertEqual([str(one.message) for one in said], [f"{place}: kept, as ended with the same case: {words}; fresh=True runs all"] if words else [])
+            return found
+        whole = [("run_1", 0), ("run_2", 0), ("run_3", 0)]
+        for _ in zip(range(2), gravier.study(base, changes, place)):
+            pass
+        first = logs()
+        self.assertEqual(len(first), 2)
+        self.assertEqual(runs("run_1, run_2"), whole)
+        self.assertEqual(logs()[:2], first)
+        self.assertEqual([row[:3] for row in csv_rows(place / "study.csv")[1:]], [["run_1", "0", "0.1"], ["run_2", "0", "0.2"], ["run_3", "0", "0.3"]])
+        # results that are gone, a run that was cut off, another value, a file that has changed
+        shutil.rmtree(place / "run_1/out")
+        log = place / "run_2/terminal.log"
+        log.write_text(log.read_text().replace("\nfinished ", "\ninterrupted *** "))
+        self.assertEqual(runs("run_3"), whole)
+        changes["scene", "friction"][2] = 0.4
+        self.assertEqual(runs("run_1, run_2"), whole)
+        os.utime(self.here("disk.csv"), (time.time() + 5,) * 2)
+        self.assertEqual(runs(), whole)
+        os.utime(self.here("disk.csv"), (1e9, 1e9))
+        self.assertEqual(runs("run_1, run_2, run_3"), whole)
+        self.assertEqual(runs(fresh=True), whole)
+        # one that did not converge keeps its status
+        base.update(scene=self.base["scene"], time={"step": 1e-3, "steps": 60}, solver={"max_iterations": 1, "fallback": "none", "layered_start": False})
+        self.assertEqual(runs(), [(name, 3) for name, _ in whole])
+        self.assertEqual(runs("run_1, run_2, run_3"), [(name, 3) for name, _ in whole])
 
 
 if __name__ == "__main__":

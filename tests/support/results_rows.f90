@@ -3,7 +3,8 @@ module gravier_test_results_rows
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_field_list, only: field_list_t
-  use gravier_results_file, only: results_file_t, provenance_t, accuracy_t
+  use gravier_results_file, only: results_file_t, accuracy_t
+  use gravier_run_provenance, only: provenance_t
   implicit none
   private
   public :: body_rows_t, contact_rows_t, boundary_rows_t, run_of, write_rows, write_boundaries

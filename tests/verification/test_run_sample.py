@@ -280,7 +280,8 @@ class Samples(RunTestCase):
             "nowhere": (merged(BASE, {"sample": {"file": "sample.nml/sample.h5"}}), "expected a file in a directory"),
             "table": (merged(CASES["table"], {"sample": {"radius_table": "missing.csv"}}), "missing.csv"),
             "closed": (merged(CASES["periodic"], {"sample": {"preparation": "compacted", "pressure": 1.0}}),
-                       "&sample preparation = 'compacted': expected another one where every axis is periodic"),
+                       "&sample preparation = 'compacted': expected another one where every axis is periodic, or a run with &scene cell_pressure from "
+                       "a sample with preparation = 'none', which compacts the cell, and &output final_bodies, which writes it"),
             "tilted": (merged(CASES["settled"], {"scene": {"gravity_table": "gravity.csv"}}),
                        "&scene gravity_table = 'gravity.csv': expected none where preparation = 'settled'"),
         }

@@ -68,7 +68,7 @@ class Containers(RunTestCase):
         run = make(merged(DRUM, {"sample": {"preparation": "settled"}}), self.here("settled"))
         settled = self.bodies(run)
         self.assertIn("boundaries  stand still until the grains are at rest\n", run.stdout)
-        self.assertRegex(run.stdout, r"sample      120 grains, contacts per grain [23]\.\d+, largest overlap 0\.0\d+ mean radii, \d+ steps\n")
+        self.assertRegex(run.stdout, r"sample      120 grains, coordination [23]\.\d+, largest overlap 0\.0\d+ mean radii, \d+ steps\n")
         self.assertLess((np.linalg.norm(settled.position, axis=1) + settled.radius).max(), RADIUS + 2e-4)
         self.assertLess(settled.position[:, 1].max(), 0.5 * RADIUS)
         # a heap that has slid round with the wall would lie to one side

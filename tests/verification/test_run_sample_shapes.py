@@ -169,6 +169,19 @@ class ShapedSamples(RunTestCase):
         self.assertEqual(len(shares), 6)
         self.assertLess(np.abs(np.array(shares) - 1.0).max(), 0.05)
 
+    def test_coordination(self):
+        """The log of a sample has the pairs of bodies that bear forces, a grain, and in brackets the points in which these pairs touch."""
+        for name, ranks in (("settled", 1), ("settled", 2), ("planar", 1), ("planar", 2)):
+            made = self.runs[name, ranks]
+            with h5py.File(made.path("sample.h5")) as file:
+                grains, candidate, antagonist = len(file["bodies/id"]), file["contacts/candidate"][()], file["contacts/antagonist"][()]
+            pairs, number = np.unique(np.stack([candidate, antagonist], axis=1), axis=0, return_counts=True)
+            self.assertGreater(number.max(), 1)
+            ends = 1 + (pairs[:, 1] > 0)
+            said = re.search(r"^sample .* coordination ([\d.]+) \(([\d.]+) points of contact a grain\), largest", made.stdout, re.M)
+            self.assertAlmostEqual(float(said[1]), ends.sum() / grains, delta=6e-4, msg=(name, ranks))
+            self.assertAlmostEqual(float(said[2]), (ends * number).sum() / grains, delta=6e-4, msg=(name, ranks))
+
     def test_program_starts_from_the_same_sample(self):
         """gravier with bodies = 'sample' has the grains of the bodies file."""
         os.makedirs(self.here("direct"), exist_ok=True)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from whole_file import Locked, Misplaced, check_place, output_lock, whole_file
 
+from .run_words import said_of, starts_of
+
 
 class CaseError(Exception):
     """A case that cannot be read, or a run that failed: one line."""
@@ -213,6 +215,31 @@ def run(groups, directory, ranks=1, program=None):
             return run_alone(groups, directory, ranks, program)
     except Locked as refused:
         raise CaseError(str(refused)) from None
+
+
+def ended(groups, directory):
+    """The exit status, 0 or 3, of a `run` of this case that has ended in `directory`; None where there is none whose results are there, or a file that the
+    case names has changed since."""
+    directory = Path(directory)
+    output = groups.get("output") or {}
+    results = (output[0] if isinstance(output, list) else output).get("directory", "results")
+    case, said, log = (_text_of(directory / name) for name in ("case.nml", "terminal.log", Path(results) / "run.log"))
+    words = said_of(said.splitlines(), "finished")
+    if case != MADE + namelist(groups) or not words or said_of(starts_of(log)[-1], "finished") != words:
+        return None
+    texts = [value for several in groups.values() for keys in (several if isinstance(several, list) else [several])
+             for given in keys.values() for value in (given if isinstance(given, (list, tuple)) else [given]) if isinstance(value, (str, Path))]
+    made = (directory / "terminal.log").stat().st_mtime
+    if any(os.path.isfile(directory / text) and os.path.getmtime(directory / text) > made for text in texts):
+        return None
+    return 3 if words.startswith("***") else 0
+
+
+def _text_of(path):
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
 
 
 def _command(program):

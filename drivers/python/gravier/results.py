@@ -1,14 +1,15 @@
 """What a run left in its directory, as numpy arrays."""
-import re
 from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from .case import CaseError, entries, parse_namelist
+from .case import CaseError, entries
 from .checksum import is_whole
+from .run_words import verdict
 from .shapes import axes_of, ball, shapes_of
+from .starts import Start, starts_in
 from .tables import ResultsError, Table, one_line, read_table
 
 #: columns without which nothing can be drawn
@@ -47,8 +48,8 @@ def along(parts, axes):
 class Run:
     """The output directory of a run, finished or under way. Files are opened when something is read, and closed again.
 
-    dimension, version, command, input_text: as in /run of results.h5; period, origin: of the start, 0 along axes that are not periodic;
-    case: the input by groups; steps, times: what is written.
+    dimension: as in /run of results.h5; period, origin: of the start, 0 along axes that are not periodic; steps, times: what is written; starts: what
+    was run from which step on, a Start for the begin and for each restart; version, command, input_text, case: those of the last start.
     """
 
     _kind = "the results of a run"
@@ -64,11 +65,11 @@ class Run:
         with self._open() as file:
             what = file["run"].attrs
             self.dimension = int(what["dimension"])
-            self.version, self.command, self.input_text = (_text(what[name]) for name in ("version", "command", "input_text"))
+            self.starts = starts_in(file["run"])
+            self.version, self.command, self.input_text, self.case = self.starts[-1][1:]
             self.period, self.origin = (np.array([what.get(f"{name}_{axis}", 0.0) for axis in "xyz"[:self.dimension]]) for name in ("period", "origin"))
             self.steps = np.array(sorted(int(name) for name in file["steps"]), dtype=int)
             self.times = np.array([file[f"steps/{step}"].attrs["time"] for step in self.steps], dtype=float)
-            self.case = parse_namelist(self.input_text)
             if not any(name.startswith("period_") for name in what):
                 # an earlier version wrote no period: that of the input
                 self.period, self.origin = (entries(self.case.get("scene", [{}])[0], name, np.zeros(self.dimension)) for name in ("period", "period_origin"))
@@ -83,6 +84,10 @@ class Run:
     def _check(self, file):
         if "run" not in file or "steps" not in file:
             raise ResultsError(f"{self.path}: no groups /run and /steps; expected the results of a run")
+
+    def case_at(self, step):
+        """The input by groups that was in force in a step: a restart may change some of its keys."""
+        return next(start.case for start in reversed(self.starts) if start.step <= step or start.step == 0)
 
     def find_step(self, step=None):
         """A step that is written: the last one unless told."""
@@ -290,18 +295,13 @@ class Run:
         return found
 
     def verdict(self):
-        """The last words of run.log: 'converged', 'not converged', 'converged only by' another criterion than the velocity error, or 'not finished'."""
+        """What run.log says of the whole run, restarts with it: 'converged', 'not converged', 'converged only by' another criterion than the velocity
+        error, or 'not finished'."""
         try:
             text = (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
         except OSError as reason:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
-        # that of the last start
-        lines = re.split(r"^Gravier \S+ \(", text, flags=re.M)[-1].splitlines()
-        said = next((line.split(None, 1)[1] for line in reversed(lines) if line.startswith("converged ")), "")
-        if not any(line.startswith("finished ") for line in lines):
-            return "not finished"
-        # without a step there is nothing to say
-        return {"yes": "converged", "NO": "not converged", "": "converged"}.get(said.split(":")[0], "converged only by")
+        return verdict(text)
 
     def history(self):
         """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""
@@ -433,7 +433,7 @@ class BodiesFile(Run):
         with self._open() as file:
             self.dimension = int(file["bodies/position"].shape[1])
             self.period, self.origin = (self._values(file[f"box/{name}"]) if "box" in file else np.zeros(self.dimension) for name in ("period", "origin"))
-        self.steps, self.times, self.case = np.array([0]), np.array([0.0]), {}
+        self.steps, self.times, self.case, self.starts = np.array([0]), np.array([0.0]), {}, [Start(0, "", "", "", {})]
 
     def _check(self, file):
         if any(f"bodies/{name}" not in file for name in ("id", "position", "radius")):

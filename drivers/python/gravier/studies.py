@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 from whole_file import whole_file
 
-from .case import CaseError, claim, made_directory, run, value_text
+from .case import CaseError, claim, ended, made_directory, run, value_text
 from .results import Run
 
 #: what the table of a study begins with
@@ -16,14 +16,15 @@ HEADER = ("run", "status")
 JUDGED = ("steps_missed", "worst_error")
 
 
-def study(base, changes, directory, ranks=1, results=None):
+def study(base, changes, directory, ranks=1, results=None, fresh=False):
     """Run `base` with every combination of `changes`, {(group, key): [values]}, each in a directory of its own below
     `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
     times is (group, name, key), with the `name` of the group, or its number from 1. Keys that change together are a tuple of such keys, whose
     values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row for each run that
     ended with status 0 or 3: its directory, its exit status, its values, how many of its steps missed their goal, and its worst velocity error
     over U, by the last words of its log. `results` is a function of a finished run, a gravier.Run, that returns {column: value}: these columns
-    follow. Warns of runs that an older, larger study has left."""
+    follow. A run that has ended with the same case stays as it is, unless a file of this case has changed since, or `fresh`. Warns of these runs, and of
+    runs that an older, larger study has left."""
     points = _points(changes)
     directory = made_directory(directory)
     claim(directory / "study.csv", {".csv": ",".join(HEADER).encode()})
@@ -31,22 +32,31 @@ def study(base, changes, directory, ranks=1, results=None):
     if older:
         warnings.warn(f"{directory}: {', '.join(f'run_{number}' for number in older)} of an older study stay; this one has run_1 to run_{len(points)}",
                       stacklevel=2)
+    cases = [_case_of(base, point) for point in points]
+    known = {} if fresh else {number: status for number, groups in enumerate(cases, 1) if (status := ended(groups, directory / f"run_{number}")) is not None}
+    if known:
+        warnings.warn(f"{directory}: kept, as ended with the same case: {', '.join(f'run_{number}' for number in known)}; fresh=True runs all", stacklevel=2)
     rows = []
     if points:
         _write_table(directory / "study.csv", points[0], rows, ())
     own = None
-    for number, point in enumerate(points, 1):
-        groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
-        for what, value in point.items():
-            _group_of(groups, *what)[what[-1]] = value
+    for number, (point, groups) in enumerate(zip(points, cases), 1):
         place = directory / f"run_{number}"
-        status = run(groups, place, ranks)
+        status = known[number] if number in known else run(groups, place, ranks)
         found = _own_results(results, groups, place, point, own)
         own = list(found)
         values = (value if isinstance(value, str) else value_text(value) for value in [*point.values(), *_judged(place), *found.values()])
         rows.append([place.name, status, *values])
         _write_table(directory / "study.csv", point, rows, own)
         yield point, place, status
+
+
+def _case_of(base, point):
+    """The case of a run."""
+    groups = {group: [dict(one) for one in keys] if isinstance(keys, list) else dict(keys) for group, keys in base.items()}
+    for what, value in point.items():
+        _group_of(groups, *what)[what[-1]] = value
+    return groups
 
 
 def _judged(place):

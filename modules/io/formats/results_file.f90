@@ -9,23 +9,10 @@ module gravier_results_file
   use gravier_finite, only: is_finite
   use gravier_field_list, only: field_t, field_list_t
   use gravier_hdf5_file, only: h5_file_t
+  use gravier_run_provenance, only: provenance_t, make_restarts, note_restart
   implicit none
   private
-  public :: results_file_t, provenance_t, figures_t, histogram_rows_t, accuracy_t
-
-  !> What was run: enough to run it again.
-  type :: provenance_t
-    !> of the program
-    character(len=:), allocatable :: version
-    !> the command line, without the number of ranks
-    character(len=:), allocatable :: command
-    !> the input file, whole
-    character(len=:), allocatable :: input_text
-    !> 2 or 3
-    integer :: dimension = 2
-    !> of the start, 0 along axes that are not periodic; lower corner [m]
-    real(dp) :: period(3) = 0.0_dp, origin(3) = 0.0_dp
-  end type provenance_t
+  public :: results_file_t, figures_t, histogram_rows_t, accuracy_t
 
   !> Counts of equal bins that begin at 0.
   type :: histogram_rows_t
@@ -100,25 +87,25 @@ contains
     self%comm = comm
     self%path = path
     call self%file%create(comm, path, error)
-    call self%file%reserve(bytes_of_headers + len(run%version) + len(run%command) + len(run%input_text), error)
+    call self%file%reserve(bytes_of_headers + run%bytes(), error)
     call self%file%make_group("/run", error)
-    call self%file%write_attribute("/run", "version", run%version, error)
-    call self%file%write_attribute("/run", "command", run%command, error)
-    call self%file%write_attribute("/run", "input_text", run%input_text, error)
+    call run%write(self%file, "/run", error)
     call self%file%write_attribute("/run", "dimension", run%dimension, error)
     do d = 1, run%dimension
       if (.not. run%period(d) > 0.0_dp) cycle
       call self%file%write_attribute("/run", "period_"//axes(d), run%period(d), error)
       call self%file%write_attribute("/run", "origin_"//axes(d), run%origin(d), error)
     end do
+    call make_restarts(self%file, error)
     call self%file%make_group("/steps", error, members=steps_in_block)
     call self%file%show(error)
   end subroutine results_open
 
-  !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. Failure, with what
+  !> Go on with a file that a run left: steps above `last_step` are removed, and more can be written. What is run from the next step
+  !> on is kept as /run/restarts/STEP; what was run from a step on that is removed goes with it. Failure, with what
   !> is there left alone: status_input for a file that is damaged or not the results of a run, status_failure for one that
   !> cannot be written to. Collective.
-  subroutine results_reopen(self, comm, path, last_step, witness, error)
+  subroutine results_reopen(self, comm, path, last_step, witness, error, run)
     class(results_file_t), intent(inout) :: self
     type(communicator_t), intent(in) :: comm
     character(len=*), intent(in) :: path
@@ -126,6 +113,8 @@ contains
     !> a dataset that every step has, by its path in the step
     character(len=*), intent(in) :: witness
     type(error_t), allocatable, intent(inout) :: error
+    !> where a step follows
+    type(provenance_t), intent(in), optional :: run
     integer(i8) :: dimension
     integer, allocatable :: later(:)
     integer :: i, n_later
@@ -149,6 +138,7 @@ contains
     do i = 1, n_later
       call self%file%remove_group("/steps/"//to_text(later(i)), error)
     end do
+    call note_restart(self%file, last_step + 1, error, run)
     call self%file%flush(error)
   end subroutine results_reopen
 

@@ -11,7 +11,7 @@ module gravier_contact_structure
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
   implicit none
   private
-  public :: contact_structure_t, n_bins, bin_width
+  public :: contact_structure_t, carrying_neighbours, n_bins, bin_width
 
   !> bins of the histogram of normal forces over their mean; one more counts what lies beyond
   integer, parameter :: n_bins = 100
@@ -58,7 +58,7 @@ contains
     type(diagnostic_features_t) :: features
 
     features%key = "structure"
-    features%meaning = "write coordination, fabric, sliding and forces in contacts"
+    features%meaning = "write coordination (by pairs of bodies), fabric, sliding and forces (by points of contact)"
   end function structure_features
 
   subroutine structure_begin(self, decomposition, physics)
@@ -144,6 +144,20 @@ contains
     self%overlap_mean = ratio(sums(nd**2 + 2), counts(overlapping))
     call distribute(self, problem, counts(carrying), h)
   end subroutine measure_structure
+
+  !> Neighbours of a free grain that carry, on average: `coordination` by itself. Collective.
+  real(dp) function carrying_neighbours(problem, halo, n_free)
+    type(contact_problem_t), intent(inout) :: problem
+    type(halo_t), intent(in) :: halo
+    !> free grains of the scene
+    integer(i8), intent(in) :: n_free
+    integer(i8) :: counts(n_counts)
+
+    counts(:) = 0
+    call count_ends(problem, halo, counts)
+    call problem%comm%sum_counts(counts)
+    carrying_neighbours = ratio(real(counts(ends), dp), n_free)
+  end function carrying_neighbours
 
   !> 0 where there is nothing to divide by.
   pure real(dp) function ratio(part, whole)

@@ -8,6 +8,7 @@ program test_io_results_file
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_hdf5_file, only: h5_file_t
   use gravier_results_file, only: results_file_t, accuracy_t
+  use gravier_run_provenance, only: provenance_t
   use gravier_test_results_rows, only: body_rows_t, contact_rows_t, boundary_rows_t, run_of, write_rows, write_boundaries
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -26,6 +27,7 @@ program test_io_results_file
   call test_any_rank_count()
   call test_refused()
   call test_reopen()
+  call test_restarts()
   call test_reopen_refused()
   call finish_checks()
   call world%free()
@@ -492,6 +494,48 @@ contains
     call expect_none(error, "reopening from the start")
     call check_steps([0])
   end subroutine test_reopen
+
+  !> What is run from a step on is kept until this step is made anew.
+  subroutine test_restarts()
+    type(results_file_t) :: results
+    type(h5_file_t) :: file
+    type(error_t), allocatable :: error
+    type(provenance_t) :: run
+    character(len=:), allocatable :: text
+
+    call write_all(world, path, 3, error)
+    run = run_of("&second /", 2)
+    call check_equal(run%bytes(), 30_i8, "bytes of the three texts")
+    call results%reopen(world, path, 20, "bodies/radius", error, run)
+    call results%close(error)
+    call results%reopen(world, path, 25, "bodies/radius", error, run_of("&third /", 2))
+    call results%close(error)
+    ! as of a restart without a step left
+    call results%reopen(world, path, 30, "bodies/radius", error)
+    call results%close(error)
+    call expect_none(error, "restarts")
+    call file%open(world, path, error)
+    call check_equal(file%member_count("/run/restarts"), 2, "two restarts")
+    call file%read_attribute("/run/restarts/21", "input_text", text, error)
+    call check(text == "&second /", "the input of the first restart")
+    call file%read_attribute("/run/restarts/26", "command", text, error)
+    call check(text == "gravier case.nml", "the command of the second restart")
+    call file%close(error)
+    ! the first one once more, and steps before it
+    call results%reopen(world, path, 20, "bodies/radius", error, run_of("&fourth /", 2))
+    call results%close(error)
+    call file%open(world, path, error)
+    call check_equal(file%member_count("/run/restarts"), 1, "restarts from step 21 on are replaced")
+    call file%read_attribute("/run/restarts/21", "input_text", text, error)
+    call check(text == "&fourth /", "the input of the last restart")
+    call file%close(error)
+    call results%reopen(world, path, 5, "bodies/radius", error)
+    call results%close(error)
+    call file%open(world, path, error)
+    call check_equal(file%member_count("/run/restarts"), 0, "no step of a restart is left")
+    call file%close(error)
+    call expect_none(error, "restarts that are replaced")
+  end subroutine test_restarts
 
   integer(i8) function n_rows(file, dataset) result(n)
     type(h5_file_t), intent(in) :: file

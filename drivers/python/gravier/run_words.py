@@ -1,0 +1,36 @@
+"""What run.log says of convergence, over all starts of a run."""
+import re
+
+VERDICTS = {"yes": "converged", "NO": "not converged"}
+
+
+def starts_of(text):
+    """The parts of a log, a list of lines each: that of the first start, and those of the restarts."""
+    parts = re.split(r"^(?=Gravier \S+ \()", text, flags=re.M)
+    return [part.splitlines() for part in parts[1:]] or [text.splitlines()]
+
+
+def said_of(lines, word):
+    """What follows the last line that begins with a word; empty where there is none."""
+    return next((line[len(word):].strip() for line in reversed(lines) if re.match(rf"{re.escape(word)}\s", line)), "")
+
+
+def convergence(text):
+    """What the line `converged` says of a run: that of the last start with steps, unless an earlier one had doubts that the counts of misses, which
+    checkpoints keep, do not tell: spot checks that refute it, or another criterion than the velocity error. Empty where no start says it."""
+    said = [said for said in (said_of(lines, "converged") for lines in starts_of(text)) if said]
+    doubts = [one for one in said if one.startswith("only by") or one.startswith("NO") and "spot checks" in one]
+    worst = next((one for one in [*said[-1:], *reversed(doubts)] if one.startswith("NO")), None)
+    return worst or (doubts or said or [""])[-1]
+
+
+def verdict(text):
+    """'converged', 'not converged', 'converged only by' or 'not finished': of a whole log."""
+    last = said_of(starts_of(text)[-1], "finished")
+    if not last:
+        return "not finished"
+    if last.startswith("***"):
+        return "not converged"
+    said = convergence(text)
+    # without a step there is nothing to say
+    return VERDICTS.get(said.split(":")[0], "converged only by") if said else "converged"

@@ -1,0 +1,81 @@
+"""What Run.verdict and gravier_report say of a run that was restarted: the words of all its starts count, not those of the last one alone."""
+import os
+import re
+import sys
+import unittest
+
+import h5py
+from gravier_runs import SOURCE, RunTestCase, gravier, merged, namelist, run_case
+
+from gravier import Run
+from gravier.run_words import convergence, verdict
+
+sys.path.insert(0, os.path.join(SOURCE, "drivers/report"))
+from run_log import RunLog  # noqa: E402
+from gravier_report import Folder, asked_section  # noqa: E402
+from verdict import BAD, accurate, converged, error_ratio  # noqa: E402
+
+HEAD = "Gravier 0.1.0 (a), dense\n"
+YES = f"{HEAD}converged   yes: every solve reached the accuracy\nfinished    all 9 steps reached the accuracy\n"
+NONE = f"{HEAD}finished    no step was left to make after step 9\n"
+MISSED = f"{HEAD}converged   NO: 3 of 9 solves did not reach the accuracy\nfinished    *** 3 of the steps did NOT\n"
+REFUTED = f"{HEAD}converged   NO: 3 of 9 solves that spot checks continued were off\nfinished    *** 3 of 9 solves that spot checks\n"
+ONLY = f"{HEAD}converged   only by the residual: every solve reached the tolerance\nfinished    every solve reached the residual\n"
+
+
+class Verdict(RunTestCase):
+
+    def test_of_all_starts(self):
+        for text, said in ((HEAD, "not finished"), (YES, "converged"), (NONE, "converged"), (YES + NONE, "converged"), (MISSED, "not converged"),
+                           # steps that were made anew are no longer counted
+                           (MISSED + YES, "converged"), (REFUTED + YES, "not converged"), (REFUTED + NONE, "not converged"),
+                           (MISSED + f"{HEAD}finished    *** 3 of the steps did NOT\n", "not converged"), (ONLY + NONE, "converged only by"),
+                           (ONLY + YES, "converged only by"), (YES + ONLY, "converged only by"), (ONLY + MISSED, "not converged"),
+                           (f"{HEAD}finished    *** 3 of the steps did NOT\n", "not converged"), (YES + HEAD, "not finished"), (YES + f"{HEAD}interrupted *** by SIGTERM\n", "not finished")):
+            self.assertEqual(verdict(text), said, text)
+        self.assertEqual(convergence(MISSED + NONE), "NO: 3 of 9 solves did not reach the accuracy")
+        self.assertEqual(converged(RunLog(REFUTED + NONE), {}).grade, BAD)
+
+    def test_no_step_left(self):
+        """A run that did not converge has not converged after a restart that had no step left to make."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
+                "time": {"step": 1e-3, "steps": 60}, "solver": {"max_iterations": 3, "fallback": "none"},
+                "output": {"directory": "bad", "checkpoint_every": 60}}
+        self.assert_status(run_case(case, 1, self.scratch), 3)
+        run = Run(self.here("bad"))
+        self.assertEqual(run.verdict(), "not converged")
+        again = gravier("--restart", "case.nml", directory=self.scratch)
+        self.assert_status(again, 3)
+        self.assertNotIn("\nconverged ", again.stdout)
+        self.assertEqual(run.verdict(), "not converged")
+
+    def test_keys_that_restarts_change(self):
+        """The case of each restart is kept with its first step, the report tells what has changed, and steps are judged by the goal of their time."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.008, "radius_max": 0.012, "friction": 0.3},
+                "time": {"step": 1e-3, "steps": 60}, "solver": {"accuracy": 0.5}, "output": {"directory": "out", "every": 20, "checkpoint_every": 20}}
+        fine = merged(case, {"time": {"steps": 80}, "solver": {"accuracy": 1e-3}})
+        self.assert_status(run_case(case, 1, self.scratch), 0)
+        for groups in (fine, fine, merged(fine, {"solver": {"accuracy": 0.2}})):
+            # the last restart has no step left to make
+            self.assert_status(run_case(groups, 1, self.scratch, options=["--restart"]), 0)
+        run = Run(self.here("out"))
+        self.assertEqual([(start.step, start.command, start.case["solver"][0]["accuracy"]) for start in run.starts],
+                         [(0, "gravier case.nml", 0.5), (61, "gravier --restart case.nml", 1e-3)])
+        self.assertEqual((run.case, run.input_text, run.command), (run.starts[1].case, namelist(fine), "gravier --restart case.nml"))
+        self.assertEqual([run.case_at(step)["solver"][0]["accuracy"] for step in (0, 60, 61, 80)], [0.5, 0.5, 1e-3, 1e-3])
+        history = run.history()
+        ratio = error_ratio(history)
+        self.assertTrue((ratio[history.step <= 60] > 1e-3).any(), "steps that a later goal would condemn")
+        folder = Folder(self.here("out"))
+        answer = accurate(folder.log, history, folder.solvers())
+        self.assertEqual(answer.grade, "good", answer.text)
+        self.assertTrue(answer.text.endswith("with a goal of 0.5, 0.001 from step 61 on."), answer.text)
+        page = asked_section(folder)
+        text = re.sub(r"<[^>]*>", " ", page[page.index("from step"):])
+        self.assertEqual(text.split(), "from step group key before then 61 &amp;time steps 60 80 61 &amp;solver accuracy 0.5 0.001".split())
+        with h5py.File(run.path) as file:
+            self.assertEqual(list(file["run/restarts"]), ["61"])
+
+
+if __name__ == "__main__":
+    unittest.main()
