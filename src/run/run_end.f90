@@ -10,7 +10,7 @@ module gravier_run_end
 
   !> steps, one after the other, of a scene that has come to rest
   integer, parameter :: steps_at_rest = 10
-  !> part of the weight of grains at rest that boundaries may not bear in a step, by errors of solves or with single grains that move
+  !> part of the weight of grains at rest that boundaries may miss in a step, by errors of solves or by single grains that move
   real(dp), parameter :: may_miss = 0.1_dp
   !> fraction of a displacement or of a strain that roundings of many steps take
   real(dp), parameter :: rounding = 1.0e-9_dp
@@ -107,8 +107,8 @@ contains
 
   end function strain_reason
 
-  !> Whether the scene rests, something bears it, and nothing that could move it comes or came in the last steps: no grains, no
-  !> boundary that goes, no change of gravity or of what moves a boundary.
+  !> Whether the scene rests, something bears it, and nothing that could move it comes or came in the last steps: no boundary that
+  !> goes, no change of gravity or of what moves a boundary. Steps in which grains are to enter later do not count as quiet.
   pure logical function rests(simulation)
     type(simulation_t), intent(in) :: simulation
     real(dp) :: since
@@ -117,7 +117,7 @@ contains
     rests = simulation%rest_energy > 0.0_dp .and. simulation%quiet >= steps_at_rest
     if (.not. rests) return
     since = (simulation%step - steps_at_rest)*simulation%physics%h
-    rests = is_borne(simulation) .and. .not. simulation%inflow%awaits(simulation%time)
+    rests = is_borne(simulation)
     if (allocated(simulation%gravity_table%has)) rests = rests .and. .not. simulation%gravity_table%changes_after(since)
     if (allocated(simulation%cell_drive%table%has)) rests = rests .and. .not. simulation%cell_drive%table%changes_after(since)
     do b = 1, size(simulation%decomposition%boundaries)
@@ -128,8 +128,8 @@ contains
     end do
   end function rests
 
-  !> Whether boundaries bear the grains in the last step, but for a tenth of their weight, and contacts the stresses that drive a cell:
-  !> what begins to move is slow, too. Body forces are not looked at.
+  !> Whether boundaries bear the grains in the last step, but for a tenth of their weight, and contacts bear something in a cell
+  !> that stresses drive: what begins to move is slow, too. Body forces are not looked at.
   pure logical function is_borne(simulation) result(borne)
     type(simulation_t), intent(in) :: simulation
     real(dp) :: weight(simulation%decomposition%nd)
