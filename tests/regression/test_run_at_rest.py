@@ -132,7 +132,7 @@ class AtRest(RunTestCase):
         pair = "id,x,y,radius\n1,0.02,0.02,0.01\n2,0.06,0.02,0.01\n"
         for name, scene, boundaries, ends in (("fall", {}, [{"shape": "plane", "normal": [0.0, 1.0]}], True),
                                               ("cell", {"gravity": [0.0, 0.0], "period": [0.08, 0.08], "cell_pressure": [1.0, 1.0]}, [], False)):
-            place = self.here(name)
+            place = self.here(f"begins {name}")
             os.makedirs(place)
             write(os.path.join(place, "pair.csv"), pair)
             run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "pair.csv", "density": 1000.0, **scene},
