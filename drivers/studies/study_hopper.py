@@ -3,7 +3,7 @@
 (D - k d)^(5/2) for spheres through a square.
 
     ./gravier study hopper [--out DIR] [--quick]              about 4 minutes on one core; GRAVIER_BIN_DIR says where gravier is
-    ./gravier study hopper [--out DIR] [--quick] --dimension 3    about 5 minutes
+    ./gravier study hopper [--out DIR] [--quick] --dimension 3    about 10 minutes
 
 leaves in DIR study_hopper.csv, study_hopper_summary.csv and study_hopper.png, or the same with _3d. --quick takes fewer openings
 and a shorter time. The closing table has each measured quantity beside what is accepted. Exit status: 0 all are held; 1 one is
@@ -27,10 +27,9 @@ CONSTANT, SHAPE = (0.55, 0.65), {2: 4.0 / np.pi * np.sqrt(2.0), 3: 4.0 / np.pi}
 # radii [m], openings [mean diameters], half of the width [m], height of the loose fill [m], steps of the filling and of a
 # discharge, share of the grains that leaves while the rate is measured, exponent of the law
 PLANE = SimpleNamespace(smallest=0.004, largest=0.006, openings=(7.0, 9.5, 12.0, 15.0, 18.0), half=0.25, height=0.65, filling=800,
-                        discharge=1400, share=0.5, exponent=1.5, name="study_hopper", solver={})
+                        discharge=1400, share=0.5, exponent=1.5, name="study_hopper")
 SPACE = SimpleNamespace(smallest=0.0045, largest=0.005, openings=(4.5, 5.5, 7.0, 8.5), half=0.08713, height=0.215, filling=800,
-                        discharge=2000, share=0.35, exponent=2.5, name="study_hopper_3d",
-                        solver={"tolerance": 2.0e-3, "max_iterations": 500, "acceleration": "momentum"})
+                        discharge=2000, share=0.35, exponent=2.5, name="study_hopper_3d")
 #: of the quick form
 QUICK = {2: {"openings": (8.0, 12.0, 18.0), "discharge": 1000},
          3: {"openings": (5.0, 8.5), "filling": 500, "discharge": 800, "height": 0.15}}
@@ -58,7 +57,6 @@ def groups(case, d, path, steps, every, final):
     return {"scene": {"dimension": d, "bodies": "file", "bodies_file": path, "density": DENSITY, "friction": 0.5,
                       "alert_distance": 1.5e-3, "skin": 2.5e-3},
             "time": {"step": STEP, "steps": steps},
-            "solver": case.solver,
             "output": {"directory": ".", "every": every, "contacts": False, "final_bodies": final}}
 
 
