@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls."""
+"""Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls,
+discharge through outlets."""
 import sys
 from pathlib import Path
 
@@ -15,15 +16,15 @@ from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool,
 from whole_file import claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
-HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,"}
+HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,"}
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
-         "angle_low": "degrees", "angle_high": "degrees"}
+         "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s"}
 
 
 def parse(arguments):
     parser = OneLineParser(prog="gravier_measure", description=__doc__)
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls", parser_class=OneLineParser)
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow", parser_class=OneLineParser)
     mixing = kinds.add_parser("mixing", help="Lacey's index and segregation of two kinds of grains, in each written state")
     mixing.add_argument("--by", default="size", metavar="WHAT", help="size, material, or x, y, z: where grains were at the start (size)")
     mixing.add_argument("--value", metavar="V", help="the first kind has radii above V [m] (middle of the radii), is of material V (the second), or began above V [m] "
@@ -37,8 +38,10 @@ def parse(arguments):
     walls = kinds.add_parser("walls", help="strains, void ratio, stress ratio and sin phi of a sample between planes (&output boundary_forces = .true.)")
     walls.add_argument("--axial", metavar="AXIS", help="axis of the load (the last one)")
     walls.add_argument("--lateral", metavar="AXES", help="axes whose mean stress the axial one is compared with (all others)")
-    walls.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
-    for kind in (mixing, heap, walls):
+    outflow = kinds.add_parser("outflow", help="number and mass of the grains that have left through outlets, and their rates")
+    for kind in (walls, outflow):
+        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
+    for kind in (mixing, heap, walls, outflow):
         kind._negative_number_matcher = NEGATIVE
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
         kind.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
@@ -51,6 +54,8 @@ def measure(run, options):
         return gravier.mixing(run, options.by, options.value, options.cell, options.since)
     if options.kind == "heap":
         return gravier.heap(run, options.along, options.shares, options.width, options.floor, options.since)
+    if options.kind == "outflow":
+        return gravier.outflow(run, options.mean, options.since)
     return gravier.wall_test(run, options.axial, options.lateral, options.mean, options.since)
 
 

@@ -76,7 +76,7 @@ def spread(values, kind, least=0.0):
 def kinds(run, step, bodies, kind):
     """Numbers to colour bodies by, from 1, and the names of all of them."""
     if kind == "subdomain":
-        values, asked = run.subdomain(step), run.case_at(step).get("decomposition", [{}])[0]
+        values, asked = run.subdomain(step), run.case.get("decomposition", [{}])[0]
         # a subdomain without a body has its colour, too
         count = int(asked.get("subdomains", numpy.prod(gravier.entries(asked, "grid", numpy.ones(run.dimension)))))
         return values, [str(number) for number in range(1, max(count, values.max()) + 1)]

@@ -47,7 +47,7 @@ class Restart(RunTestCase):
         """All that a run leaves and that is not a time on the clock, or the history of its file."""
         path = os.path.join(directory, results)
         found = {f"results{name}": value for name, value in contents(os.path.join(path, "results.h5")).items()
-                 if not name.startswith(("/run/", "/run@"))}
+                 if not name.startswith("/run@")}
         for table in ("history", "trace"):
             if os.path.exists(os.path.join(path, f"{table}.csv")):
                 rows = read_csv(os.path.join(path, f"{table}.csv"))

@@ -316,6 +316,41 @@ class Command(RunTestCase):
         self.assertAlmostEqual(sizes.segregation[0], -1.0, places=6)
         self.assertTrue(np.all(sizes.segregation < -0.2) and sizes.mixing[0] < 0.4)
 
+    def test_outflow(self):
+        """Disks that fall one after the other through an outlet: numbers and masses add up, rates are those of a row, and what left before does not count."""
+        case = {"scene": {"bodies": "file", "bodies_file": "column.csv", "density": 2500.0},
+                "boundary": [{"name": "out", "shape": "outlet", "point": [0.0, 0.0], "normal": [0.0, 1.0]}], "time": {"step": 1e-3, "steps": 400},
+                "output": {"directory": "out", "every": 0}}
+        radius = 0.01 + 0.001 * np.arange(10)
+        write(self.here("column.csv"), "id,x,y,radius\n" + "".join(f"{k + 1},0.0,{0.0495 * (k + 1)},{radius[k]}\n" for k in range(10)))
+        self.assert_status(run_case(case, 1, self.scratch), 0)
+        run, mass = gravier.Run(self.here("out")), 2500.0 * np.pi * radius**2
+        # a disk is behind the outlet in the middle of the step in which it leaves
+        step = np.ceil(np.sqrt(2.0 * 0.0495 * np.arange(1, 11) / 9.81) / 1e-3 + 0.5)
+        for mean, since in ((1, 0.0), (50, 0.0), (70, 0.1505), (150, 0.0)):
+            found = gravier.outflow(run, mean, since)
+            first = np.floor(since / 1e-3)
+            ends = first + mean * np.arange(1, (400 - first) // mean + 1)
+            np.testing.assert_array_equal(found.step, ends)
+            np.testing.assert_allclose(found.time, 1e-3 * ends, rtol=1e-12)
+            number = np.array([((step > first) & (step <= end)).sum() for end in ends])
+            total = np.array([mass[(step > first) & (step <= end)].sum() for end in ends])
+            self.assertLessEqual(np.abs(found.left - number).max(), int(mean == 1), "a disk that is at the outlet within rounding may leave a step later")
+            if mean > 1:
+                np.testing.assert_allclose(found.left_mass, total, rtol=1e-12)
+                np.testing.assert_allclose(found.mass_rate, np.diff(total, prepend=0.0) / (mean * 1e-3), rtol=1e-12)
+                np.testing.assert_allclose(found.number_rate, np.diff(number, prepend=0) / (mean * 1e-3), rtol=1e-12)
+        self.assertEqual(gravier.outflow(run, 400).left[-1], 10)
+        for options, words in (({"mean": 0}, "mean 0: expected a whole number of steps above 0"), ({"mean": 401}, "400 steps after 0 s; expected 401 at least"),
+                               ({"since": 0.4}, "0 steps after 0.4 s; expected 1 at least")):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.outflow(run, **options)
+        done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(done.stdout, f"last row: time 0.4 s, left 10 grains, left mass {mass.sum():.4g} kg, number rate 25 1/s, mass rate "
+                                      f"{mass.sum() / 0.4:.4g} kg/s\nout/outflow.csv\n")
+        np.testing.assert_allclose(gravier.read_table(self.here("out/outflow.csv")).left_mass, [mass.sum()], rtol=1e-8)
+
     def test_pictures(self):
         """Columns of a table that have numbers, or those that are told, have a panel each."""
         path = os.path.join(self.directory, "results/heap.csv")
@@ -339,7 +374,8 @@ class Command(RunTestCase):
                                  (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
                                  (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
                                  (["mixing", "results", "--by", "material"], "material None; expected one of"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
-                                 (["walls", "results", "--mean", "0"], "expected an integer >= 1"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
+                                 (["walls", "results", "--mean", "0"], "expected an integer >= 1"),
+                                 (["outflow", "results"], "no column left_mass; expected a run with a boundary of shape outlet"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
             with self.subTest(arguments=arguments):
                 done = self.measure(*arguments)
                 self.assertEqual((done.returncode, done.stdout), (2, ""))

@@ -57,10 +57,10 @@ class MeshRanks(RunTestCase):
 
     def state(self, run):
         """All that a run leaves and that is no time on the clock."""
-        found = {name: value for name, value in run.results().items() if not name.startswith(("/run/", "/run@"))}
+        found = {name: value for name, value in run.results().items() if not name.startswith("/run@")}
         found.update({name: value for name, value in run.history().items() if not name.endswith("_seconds")})
         found.update({f"final{name}": value for name, value in contents(run.path("results", "final_bodies.h5")).items()
-                      if not name.startswith(("/run/", "/run@"))})
+                      if not name.startswith("/run@")})
         return found
 
     def play(self, title, dimension, shapes, ranks, *parts):

@@ -44,11 +44,11 @@ class ShapeRanks(RunTestCase):
 
     def state(self, run):
         """All that a run leaves and that is no time on the clock."""
-        found = {name: value for name, value in run.results().items() if not name.startswith(("/run/", "/run@"))}
+        found = {name: value for name, value in run.results().items() if not name.startswith("/run@")}
         for table in (run.history(), run.trace()):
             found.update({name: value for name, value in table.items() if not name.endswith("_seconds")})
         found.update({f"final{name}": value for name, value in contents(run.path("results", "final_bodies.h5")).items()
-                      if not name.startswith(("/run/", "/run@"))})
+                      if not name.startswith("/run@")})
         return found
 
     def compare(self, title, dimension, *parts):

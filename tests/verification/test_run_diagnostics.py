@@ -517,7 +517,7 @@ class Diagnostics(RunTestCase):
         for name, values in whole.history().items():
             if not name.endswith("_seconds"):
                 np.testing.assert_array_equal(history[name], values, name)
-        self.assertEqual([name for name in differences(whole.results(), again.results()) if not name.startswith(("/run/", "/run@"))], [])
+        self.assertEqual([name for name in differences(whole.results(), again.results()) if "/run@" not in name], [])
 
     def test_only_what_is_asked_for(self):
         case, boundaries = self.stirred(2)

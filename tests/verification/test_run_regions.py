@@ -264,7 +264,7 @@ class Regions(RunTestCase):
                 self.assertGreater(whole.history()["entered"].sum(), 0)
                 other = self.play(f"ranks{dimension}", case, ranks=4 if dimension == 2 else 2)
                 self.same_history(whole, other)
-                self.assertEqual([name for name in differences(whole.results(), other.results()) if not name.startswith(("/run/", "/run@"))], [])
+                self.assertEqual([name for name in differences(whole.results(), other.results()) if "/run@" not in name], [])
                 part = self.play(f"part{dimension}", merged(case, {"time": {"steps": 30}}))
                 write(os.path.join(part.directory, "case.nml"), namelist(case))
                 again = gravier("--restart", "case.nml", ranks=2, directory=part.directory)

@@ -14,6 +14,7 @@ from .heaps import heap
 from .joined_bodies import join_bodies
 from .library import SimulationError
 from .mixing import mixing
+from .outflows import outflow
 from .restarts import write_bodies
 from .results import BodiesFile, Run
 from .rough_walls import rough_walls
@@ -24,5 +25,5 @@ from .tables import ResultsError, Table, read_table, write_table
 from .wall_tests import wall_test
 
 __all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "entries", "heap", "join_bodies", "mixing", "namelist", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study", "value_text",
-           "wall_test", "write_bodies", "write_table"]
+           "entries", "heap", "join_bodies", "mixing", "namelist", "outflow", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study",
+           "value_text", "wall_test", "write_bodies", "write_table"]
