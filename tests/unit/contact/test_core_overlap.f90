@@ -167,8 +167,8 @@ contains
       place(1) = draws%between(0.0_dp, 1.5_dp*half)
       place(2) = draws%between(-wide + 2.0_dp, wide - 2.0_dp)
       place(3) = draws%between(-half, half)
-      pair%way(:) = matmul(turn%m, place)
-      pair%way(:) = -pair%way
+      x(:) = matmul(turn%m, place)
+      pair%way(:) = -x
       call find_least_separation(box%piece(1), sheet, pair, found)
       call try_all_axes(box%piece(1), sheet, pair, best, edges)
       if (best >= 0.0_dp) cycle
