@@ -82,7 +82,7 @@ contains
     associate (fallen => simulation%fallen)
       text = "warning     by step "//to_text(simulation%step)//" "//counted(fallen%number, "grain")// &
         & trim(merge(" has ", " have", fallen%number == 1))//" fallen below all boundaries, the one of the lowest number being "// &
-        & to_text(fallen%first)//": nothing stops what falls there, and an &boundary of shape 'outlet' would remove it"
+        & to_text(fallen%first)//": no boundary is there to stop it, and an &boundary of shape 'outlet' would remove it"
     end associate
   end function fallen_warning
 

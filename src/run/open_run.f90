@@ -169,7 +169,8 @@ contains
       call check_load_areas(simulation%decomposition, error)
       call simulation%advance(figures, error, watch=log)
       if (allocated(error)) return
-      call simulation%fallen%note_step(simulation%step, simulation%decomposition, simulation%physics)
+      call simulation%fallen%note_step(simulation%step, simulation%decomposition, simulation%physics, &
+        & allocated(simulation%gravity_table%has))
       call log%write_events(simulation, figures, error)
       call log%write_step(simulation, figures, MPI_Wtime() - step_start, error)
       if (allocated(figures%cause)) call log%line("            *** "//figures%cause, error)
@@ -265,7 +266,7 @@ contains
       end if
       if (self%figures%contacts > 0 .and. simulation%step > 1) call log%write_interface(self%figures, &
         & simulation%decomposition%n_subdomains, error)
-      call simulation%fallen%look(simulation%decomposition, simulation%physics)
+      call simulation%fallen%look(simulation%decomposition, simulation%physics, allocated(simulation%gravity_table%has))
       call log%write_end(simulation, MPI_Wtime() - interruption%first_step, error)
       if (has_ended(simulation)) then
         call log%line(end_line(simulation), error)

@@ -253,7 +253,7 @@ def check_numbers(run):
 
 class Sleepers:
     """The momenta that grains which stand still may have by their impulses, l of theory.md, section 12: a grain that sleeps that of
-    the step in which it fell asleep, any other half of that of now."""
+    the step in which it fell asleep, beside what this step left to it, any other half of that of now."""
     #: of the normal impulses on a grain
     SHARE = 0.1
 
@@ -261,6 +261,18 @@ class Sleepers:
         self.speed, self.after = scene.sleep_speed, scene.sleep_after
         #: by the identifiers of those that sleep; of those that slept before the first state nothing is known
         self.known = {}
+        #: velocities that the step left to those that sleep, by their identifiers
+        self.left = {}
+
+    def beside_left(self, contacts, rest, velocity):
+        """The velocities that grains would have by their impulses, those of sleepers less what was left to them."""
+        sleeps, slept = rest[1] >= self.after, rest[0] >= self.after
+        self.left = {i: self.left.get(i, np.zeros(velocity.shape[1])) if slept[k] else velocity[k].copy()
+                     for k, i in enumerate(contacts.identifiers) if sleeps[k]}
+        less = np.zeros_like(velocity)
+        for k in np.flatnonzero(sleeps & slept):
+            less[k] = self.left[contacts.identifiers[k]]
+        return velocity - less
 
     def limits(self, contacts, rest):
         """Of all bodies (grains, walls), infinite where it is not known, by the steps at rest in the last state and in this one."""
@@ -295,14 +307,15 @@ def check_states(run, scene, history):
         limits = np.zeros(len(contacts.mass))
         if scene.sleep_speed > 0.0:
             limits = sleepers.limits(contacts, [results[f"/steps/{s}/bodies/rest"] for s in (last, step)])
-        found = check_step(contacts, scene, results, (last, step), (history["residual"][rows[step]], limits))
+        found = check_step(contacts, scene, results, (last, step), (history["residual"][rows[step]], limits, sleepers))
         wrong += [f"step {step}: {words}" for words in found]
     return wrong
 
 
 def check_step(contacts, scene, results, steps, bounds):
-    """Complaints about a step; `bounds`: the residual that was reported, and the momenta that grains which stand still may have."""
-    residual, limits = bounds
+    """Complaints about a step; `bounds`: the residual that was reported, the momenta that grains which stand still may have, and what is known of
+    those that sleep."""
+    residual, limits, sleepers = bounds
     old, new = (contacts.velocities(results, step) for step in steps)
     d = scene.dimension
     wrong = []
@@ -316,8 +329,9 @@ def check_step(contacts, scene, results, steps, bounds):
             # grains that stand still: the laws are those of the velocities that they would have
             standing = contacts.free & np.all(new == 0.0, axis=1)
             new = np.where(standing[:, None], loaded + change, new)
+            given = sleepers.beside_left(contacts, [results[f"/steps/{s}/bodies/rest"] for s in steps], new)
             momenta = np.where(contacts.free, contacts.mass, 0.0) * (
-                np.linalg.norm(new[:, :d], axis=1) + contacts.radius * np.linalg.norm(new[:, d:], axis=1))
+                np.linalg.norm(given[:, :d], axis=1) + contacts.radius * np.linalg.norm(given[:, d:], axis=1))
             usual = np.sqrt((contacts.all_impulses() ** 2).sum() / max(contacts.n, 1))
             if np.any((momenta > limits + ROUNDING * usual)[standing]):
                 wrong.append("a grain stands still that moves by its impulses")

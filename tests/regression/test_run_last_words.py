@@ -330,8 +330,8 @@ class FallenGrains(RunTestCase):
         return [text for text in run.stdout.splitlines() if "below all boundaries" in text]
 
     def test_told_once(self):
-        told = ["warning     by step 200 2 grains have fallen below all boundaries, the one of the lowest number being 9: nothing stops "
-                "what falls there, and an &boundary of shape 'outlet' would remove it",
+        told = ["warning     by step 200 2 grains have fallen below all boundaries, the one of the lowest number being 9: no boundary "
+                "is there to stop it, and an &boundary of shape 'outlet' would remove it",
                 "warnings    grains fallen below all boundaries 2",
                 "finished    all 350 steps reached the accuracy; 2 grains had fallen below all boundaries; results in results"]
         for ranks in (1, 2):
@@ -361,5 +361,5 @@ class FallenGrains(RunTestCase):
         """A plane below, an outlet, a period along gravity; no gravity."""
         below = {"name": "out", "shape": "outlet", "point": [0.0, -1000.0], "normal": [0.0, 1.0]}
         for boundaries, scene in (([self.LEDGE, self.FAR], {}), ([self.LEDGE, below], {}), ([self.LEDGE], {"period": [0.0, 9.0]}),
-                                  ([self.LEDGE], {"gravity": [0.0, 0.0]}), ([self.SIDE], {})):
+                                  ([self.LEDGE], {"gravity": [0.0, 0.0]}), ([self.SIDE], {}), ([self.LEDGE], {"body_force": [1.0, 0.0]})):
             self.assertEqual(self.run_with(boundaries, **scene), [])

@@ -132,6 +132,8 @@ contains
     !> of the edge of b against the faces of a; 0 for an edge that has none
     real(dp) :: slope(0:size(a%face_normal, 2))
     integer :: i, j, f, turned
+    !> the edge of b is one of a flat piece
+    logical :: is_flat
 
     do i = 1, edges_a%n
       along_a(:, i) = a%vertex(:, edges_a%vertex(2, i)) - a%vertex(:, edges_a%vertex(1, i))
@@ -145,6 +147,7 @@ contains
       do f = 1, 2
         if (edges_b%face(f, j) > 0) call turn(pair, b%face_normal(:, edges_b%face(f, j)), normal_b(:, f))
       end do
+      is_flat = dot_product(normal_b(:, 1), normal_b(:, 2)) < doubtful - 1.0_dp
       do f = 1, size(a%face_normal, 2)
         slope(f) = along_b(1)*a%face_normal(1, f) + along_b(2)*a%face_normal(2, f) + along_b(3)*a%face_normal(3, f)
       end do
@@ -159,11 +162,11 @@ contains
         n(:) = n/sqrt(squared)
         call place_a(a, pair, edges_a%vertex(1, i), x)
         do turned = 1, 2
-          ! any two points bound the separation from above, and those of outermost edges are as far apart as the pieces
+          ! any two points bound the separation from above; those of outermost edges, which edges of a solid are, are as far apart
           bound = dot_product(n, x) - dot_product(n, y)
           if (bound > found%distance) then
             before = found%distance
-            bound = bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b))
+            bound = merge(bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b)), nowhere, is_flat)
             if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, of_neither, bound, found)
             if (found%distance > before) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
           end if

@@ -29,33 +29,37 @@ module gravier_fallen_grains
 contains
 
   !> Look at the grains after every hundredth step, and find how many more there are. Collective.
-  subroutine fallen_grains_note_step(self, step, decomposition, physics)
+  subroutine fallen_grains_note_step(self, step, decomposition, physics, turns)
     class(fallen_grains_t), intent(inout) :: self
     integer, intent(in) :: step
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
+    !> gravity changes in the course of the run
+    logical, intent(in) :: turns
 
     self%more = 0
     if (mod(step, looks_every) /= 0) return
-    call self%look(decomposition, physics)
+    call self%look(decomposition, physics, turns)
     self%more = max(0_i8, self%number - self%most)
     self%most = max(self%most, self%number)
   end subroutine fallen_grains_note_step
 
   !> Count the grains that move down and whose highest point is lower than all boundaries. Down is the direction of gravity. There
-  !> are none without gravity, in a scene that is periodic along it, where a plane faces up, and where an outlet takes grains.
-  !> Collective.
-  subroutine fallen_grains_look(self, decomposition, physics)
+  !> are none without gravity or where it changes, with a body force, in a scene that is periodic along gravity, where a plane faces
+  !> up or a cylinder is inclined, and where an outlet takes grains. Collective.
+  subroutine fallen_grains_look(self, decomposition, physics, turns)
     class(fallen_grains_t), intent(inout) :: self
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
+    !> gravity changes in the course of the run
+    logical, intent(in) :: turns
     real(dp) :: down(3), floor, first
     integer :: nd, s, k, r
     logical :: applies
 
     self%number = 0
     self%first = 0
-    applies = norm2(physics%gravity) > 0.0_dp
+    applies = norm2(physics%gravity) > 0.0_dp .and. .not. (turns .or. any(abs(physics%body_force) > 0.0_dp))
     if (applies) down(:) = physics%gravity/norm2(physics%gravity)
     if (applies) applies = .not. any(decomposition%period%length > 0.0_dp .and. abs(down) > level)
     ! ranks that have come to differ by the loop of a user go through the same messages
@@ -112,7 +116,8 @@ contains
         if (surface%is%endless) then
           if (dot_product(surface%axis, down) < -level) lowest = huge(1.0_dp)
         else if (surface%is%endless_axis .and. abs(dot_product(surface%axis, down)) > level) then
-          lowest = huge(1.0_dp)
+          ! upright, it is like a plane that faces across
+          if (abs(dot_product(surface%axis, down)) < 1.0_dp - level) lowest = huge(1.0_dp)
         else
           call surface%find_box(n, corner)
           do k = 1, n
