@@ -80,9 +80,10 @@ contains
     character(len=:), allocatable :: text
 
     associate (fallen => simulation%fallen)
-      text = "warning     by step "//to_text(simulation%step)//" "//counted(fallen%number, "grain")// &
-        & trim(merge(" has ", " have", fallen%number == 1))//" fallen below all boundaries, the one of the lowest number being "// &
-        & to_text(fallen%first)//": no boundary is there to stop it, and an &boundary of shape 'outlet' would remove it"
+      text = "warning     "//counted(fallen%number, "grain")//trim(merge(" has ", " have", fallen%number == 1))// &
+        & " fallen below all boundaries by step "//to_text(simulation%step)//", grain "//to_text(fallen%first)// &
+        & trim(merge("           ", " among them", fallen%number == 1))// &
+        & ": no boundary there stops a grain, and one of shape 'outlet' would remove it"
     end associate
   end function fallen_warning
 

@@ -330,20 +330,20 @@ class FallenGrains(RunTestCase):
         return [text for text in run.stdout.splitlines() if "below all boundaries" in text]
 
     def test_told_once(self):
-        told = ["warning     by step 200 2 grains have fallen below all boundaries, the one of the lowest number being 9: no boundary "
-                "is there to stop it, and an &boundary of shape 'outlet' would remove it",
+        told = ["warning     2 grains have fallen below all boundaries by step 200, grain 9 among them: no boundary there stops a grain, "
+                "and one of shape 'outlet' would remove it",
                 "warnings    grains fallen below all boundaries 2",
                 "finished    all 350 steps reached the accuracy; 2 grains had fallen below all boundaries; results in results"]
         for ranks in (1, 2):
             self.assertEqual(self.run_with([self.LEDGE, self.SIDE], ranks, steps=350), told)
         one = self.run_with([self.LEDGE], disks=self.DISKS[:4])
-        self.assertRegex(one[0], "1 grain has fallen .* number being 9:")
+        self.assertRegex(one[0], "1 grain has fallen .* by step 200, grain 9:")
         self.assertRegex(one[-1], "; 1 grain had fallen")
 
     def test_along_gravity(self):
         """Down is where gravity points."""
         upright = {"name": "ledge", "shape": "segment", "point": [0.0, -0.5], "end": [0.0, 0.5]}
-        self.assertRegex(self.run_with([upright], gravity=[-9.81, 0.0], turned=True)[0], "step 200 2 grains have")
+        self.assertRegex(self.run_with([upright], gravity=[-9.81, 0.0], turned=True)[0], "2 grains have .* by step 200")
         # the two come down by 0.31 m, and begin at a height of 0 and of 0.05 m
         wall = {"name": "wall", "shape": "segment", "point": [3.0, 0.0], "end": [3.0, -0.2]}
         self.assertEqual([len(self.run_with([self.LEDGE, {**wall, "end": [3.0, -deep]}])) for deep in (0.1, 0.3)], [3, 0])
@@ -356,6 +356,15 @@ class FallenGrains(RunTestCase):
             write(self.here("glued.csv"), "id,x,y,radius,group\n" + rows + deep)
             told = self.run_with(boundaries, bodies_file="glued.csv")
             self.assertEqual(len(told), fallen, told)
+
+    def test_beside_a_cylinder(self):
+        """An upright cylinder stops nothing that falls in it, and one that leans may."""
+        write(self.here("balls.csv"), "id,x,y,z,radius\n1,0,0,0.05,0.05\n5,0.9,0,0,0.05\n")
+        floor = {"name": "floor", "shape": "rectangle", "point": [-0.5, -0.5, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0]}
+        for axis, lines in (([0.0, 0.0, 1.0], 3), ([0.3, 0.0, 1.0], 0)):
+            silo = {"name": "silo", "shape": "cylinder", "point": [0.0, 0.0, 0.0], "axis": axis, "radius": 3.0}
+            told = self.run_with([floor, silo], dimension=3, bodies_file="balls.csv", gravity=[0.0, 0.0, -9.81])
+            self.assertEqual(len(told), lines, told)
 
     def test_what_may_stop(self):
         """A plane below, an outlet, a period along gravity; no gravity."""

@@ -128,7 +128,7 @@ contains
     type(placed_pair_t), intent(in) :: pair
     type(edges_t), intent(in) :: edges_a, edges_b
     type(core_distance_t), intent(inout) :: found
-    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared, bound, before
+    real(dp) :: along_a(3, edges_a%n), along_b(3), side(3), n(3), x(3), y(3), normal_b(3, 2), squared, bound, least, before
     !> of the edge of b against the faces of a; 0 for an edge that has none
     real(dp) :: slope(0:size(a%face_normal, 2))
     integer :: i, j, f, turned
@@ -162,12 +162,13 @@ contains
         n(:) = n/sqrt(squared)
         call place_a(a, pair, edges_a%vertex(1, i), x)
         do turned = 1, 2
-          ! any two points bound the separation from above; those of outermost edges, which edges of a solid are, are as far apart
+          ! any two points bound the separation from above, and outermost edges reach the bound; an edge on the far side of a flat
+          ! piece does not
           bound = dot_product(n, x) - dot_product(n, y)
           if (bound > found%distance) then
             before = found%distance
-            bound = merge(bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b)), nowhere, is_flat)
-            if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, of_neither, bound, found)
+            least = merge(bound - doubtful*(pair%radius_a*norm2(along_a(:, i)) + pair%radius_b*norm2(along_b)), nowhere, is_flat)
+            if (faces_other(n, a, edges_a%face(:, i), normal_b)) call try_axis(a, b, pair, n, of_neither, least, found)
             if (found%distance > before) call meet_edges(pair, x, along_a(:, i), y, along_b, found)
           end if
           n(:) = -n
