@@ -150,6 +150,30 @@ class Sleeping(RunTestCase):
                 self.assertGreater(history["sleeping"].max(), 15)
                 self.assertLess(abs(history["force_y:floor"][-100:].mean() / -right - 1.0), 0.04)
 
+    def test_load_that_jumps(self):
+        """The force on a piston rises by a twentieth in one step, below disks that sleep: piston and disks go the way of that force at once. They were
+        held for up to 200 steps."""
+        rng = np.random.default_rng(1)
+        grains = [Grain([RADIUS * 2.1 * (i + 0.5), RADIUS * (2.1 * j + 1.15)], radius=radius, mass=2500.0 * np.pi * radius**2)
+                  for j in range(12) for i in range(6) for radius in [rng.uniform(0.85, 1.0) * RADIUS]]
+        mass, jump, steps, extra = 20.0, 0.711, 1010, 0.05
+        weight = 9.81 * sum(grain.mass for grain in grains)
+        load = write(f"{self.scratch}/jump.csv", f"time,fy\n0,{weight}\n{jump - 1e-3},{weight}\n{jump},{(1 + extra) * weight}\n")
+        case = {
+            "scene": {"dimension": 2, "bodies": "file", "bodies_file": write(f"{self.scratch}/jump_bodies.csv", bodies_csv(grains)), "friction": 0.4,
+                      "wall_friction": 0.0},
+            "boundary": [plane([0, 0], [0, 1]), plane([0, 0], [1, 0]), plane([12.6 * RADIUS, 0], [-1, 0]),
+                         {**plane([0, 0], [0, 1]), "name": "piston", "free": [False, True], "mass": mass, "table": load}],
+            "time": {"step": 1e-3, "steps": steps}, "solver": {"sleeping": True},
+            "output": {"directory": "results", "every": 0, "boundary_forces": True}}
+        run = run_case(case, 1, f"{self.scratch}/jump")
+        self.assert_status(run, 0)
+        history = run.history()
+        before, after = (history["position_y:piston"][step - 1] for step in (round(jump / 1e-3) - 1, steps))
+        self.assertGreater(history["sleeping"][round(jump / 1e-3) - 10], 50)
+        exact = 0.5 * extra * weight / (weight / 9.81 + mass) * (1e-3 * steps - jump)**2
+        self.assertLess(abs((after - before) / exact - 1.0), 0.01)
+
     def test_contacts_at_an_early_end(self):
         """A plate pushes a disk along until the run ends by it, beside a column that sleeps: all contacts are written as in the middle of
         the last step, as they are where nothing sleeps."""

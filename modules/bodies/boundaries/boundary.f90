@@ -65,6 +65,7 @@ module gravier_boundary
     procedure :: last_velocity_at => boundary_last_velocity_at
     procedure :: prescribe => boundary_prescribe
     procedure :: applied_force => boundary_applied_force
+    procedure :: load_changes => boundary_load_changes
     procedure :: load_axis => boundary_load_axis
     procedure :: move => boundary_move
     procedure :: carry => boundary_carry
@@ -350,6 +351,21 @@ contains
       force(d) = self%drive%force_at(d, time) + self%drive%pressure_at(time)*area*normal(d)
     end do
   end subroutine boundary_applied_force
+
+  !> Whether the force or the pressure that moves it differs between two times.
+  pure logical function boundary_load_changes(self, since, time) result(changes)
+    class(boundary_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: since, time
+    integer :: d
+
+    changes = .false.
+    if (.not. (self%is_driven() .and. self%drive%changes())) return
+    changes = abs(self%drive%pressure_at(time) - self%drive%pressure_at(since)) > 0.0_dp
+    do d = 1, 3
+      if (self%free(d)) changes = changes .or. abs(self%drive%force_at(d, time) - self%drive%force_at(d, since)) > 0.0_dp
+    end do
+  end function boundary_load_changes
 
   !> Axis along which forces move the boundary: of a plane that of its normal, else that of the largest given force among
   !> the free ones.

@@ -78,7 +78,7 @@ contains
     type(time_table_t), intent(in) :: gravity_table
     !> at the start of the step [s]
     real(dp), intent(in) :: time
-    !> whether gravity has changed
+    !> whether gravity has changed, or the load of a boundary
     logical, intent(out) :: changed
     real(dp) :: force(decomposition%nd), end_time
     integer :: b, d, nd
@@ -99,6 +99,7 @@ contains
         boundary%last_spin(:) = boundary%spin
         call boundary%prescribe(nd, end_time)
         if (.not. boundary%is_driven()) cycle
+        changed = changed .or. boundary%load_changes(time, end_time)
         call boundary%applied_force(nd, end_time, facing_area(decomposition, b), force)
         do d = 1, nd
           if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + physics%h*force(d)/boundary%mass

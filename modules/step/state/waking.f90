@@ -1,5 +1,5 @@
 !> Which pairs are looked at while some bodies sleep, and what wakes these: impulses that would move them, a boundary that begins to
-!> move, a load that changes (gravier_sleeping has the rule).
+!> move, impulses that change. All wake where gravity or the load of a boundary changes (gravier_sleeping has the rule).
 module gravier_waking
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange

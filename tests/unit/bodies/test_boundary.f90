@@ -351,6 +351,10 @@ contains
       ! the axis is the first one
       found(n) = (force(1) - found(n - nd))/2.0_dp
       call check_vector(found(1:n), expected(1:n), 100*rounding, "driven by "//names)
+      call check(b%load_changes(1.0_dp, 1.1_dp) .eqv. k >= n - nd, "a load that changes by a column of a table")
+      call check(.not. b%load_changes(2.0_dp, 2.1_dp), "a load after the last row of a table")
+      b%free(:) = .false.
+      call check(.not. b%load_changes(1.0_dp, 1.1_dp), "a load that moves nothing")
     end do
   end subroutine test_drives
 
