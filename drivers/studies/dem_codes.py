@@ -1,9 +1,10 @@
-"""Runs of Gravier and of LAMMPS for study_dem.py: processor seconds, and what each code leaves."""
+"""Runs of Gravier and of LAMMPS for study_dem.py: seconds, and what each code leaves."""
 import os
 import re
 import resource
 import subprocess
 import sys
+import time
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -11,29 +12,40 @@ from study_support import BINARIES, ENVIRONMENT
 
 from gravier.case import namelist
 
-# either code alone on one core, without the daemon that Open MPI starts otherwise
-ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "OMPI_MCA_ess_singleton_isolated": "1"}
+# each rank of either code on one core
+ONE_CORE = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+# a rank by itself, without the daemon that Open MPI starts otherwise
+ALONE = {"OMPI_MCA_ess_singleton_isolated": "1"}
 
 
-def timed(command, place, good=(0,)):
-    """Run a command in `place`, which keeps what it says in said.txt; its user seconds on the processor."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+def timed(command, place, good=(0,), ranks=1):
+    """Run a command on so many ranks in `place`, which keeps what it says in said.txt; its user seconds on the processor, or seconds on the
+    clock if there are several ranks, which wait for each other."""
+    launcher = [os.environ.get("MPIEXEC", "mpiexec"), "-n", str(ranks)] if ranks > 1 else []
+    before, start = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.monotonic()
     with open(place / "said.txt", "w", encoding="utf-8") as said:
-        status = subprocess.run([str(word) for word in command], cwd=place, stdin=subprocess.DEVNULL, stdout=said, stderr=said, check=False,
-                                env={**ENVIRONMENT, **os.environ, **ONE_CORE}).returncode
+        status = subprocess.run([str(word) for word in [*launcher, *command]], cwd=place, stdin=subprocess.DEVNULL, stdout=said, stderr=said,
+                                check=False, env={**ENVIRONMENT, **os.environ, **ONE_CORE, **({} if launcher else ALONE)}).returncode
     if status not in good:
-        lines = (place / "said.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines()
-        sys.exit(f"study_dem: {place}: {command[0]} ended with status {status}: {(lines or ['nothing said'])[-1]}")
+        lines = (place / "said.txt").read_text(encoding="utf-8", errors="replace").strip().splitlines() or ["nothing said"]
+        # the launcher of several ranks has the last words
+        reason = next((line for line in lines if "error: " in line.lower()), lines[-1])
+        sys.exit(f"study_dem: {place}: {command[0]} ended with status {status}: {reason}")
+    if launcher:
+        return time.monotonic() - start
     return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
 
 
 # ---- Gravier
 
-def run_gravier(place, groups, boundaries=(), program="gravier"):
-    """Seconds of a run of `groups` and `boundaries` in `place`; solves that miss their accuracy are told by Log."""
+def run_gravier(place, groups, boundaries=(), program="gravier", ranks=1):
+    """Seconds of a run of `groups` and `boundaries` in `place`; solves that miss their accuracy are told by Log. Several ranks have a subdomain
+    each beside each other, whose grains fall within it, by NSCDD, which has the momentum of the method of one."""
+    if ranks > 1:
+        groups = {**groups, "solver": {"method": "nscdd", **groups["solver"]}, "decomposition": {"grid": [ranks, 1, 1]}}
     place.mkdir(parents=True, exist_ok=True)
     (place / "case.nml").write_text(namelist({**groups, "boundary": list(boundaries)}), encoding="utf-8")
-    return timed([(BINARIES / program).resolve(), "case.nml"], place, (0, 3))
+    return timed([(BINARIES / program).resolve(), "case.nml"], place, (0, 3), ranks)
 
 
 class Log:
@@ -59,11 +71,11 @@ class Log:
 
 # ---- LAMMPS
 
-def run_lammps(program, place, script):
-    """Seconds of a run of LAMMPS on one core."""
+def run_lammps(program, place, script, ranks=1):
+    """Seconds of a run of LAMMPS."""
     place.mkdir(parents=True, exist_ok=True)
     (place / "in.lammps").write_text(script, encoding="ascii")
-    return timed([program, "-in", "in.lammps", "-log", "log.lammps", "-screen", "none"], place)
+    return timed([program, "-in", "in.lammps", "-log", "log.lammps", "-screen", "none"], place, ranks=ranks)
 
 
 def lammps_version(program):

@@ -38,11 +38,12 @@ class Setting:
 
 
 def lammps_head(stiffness, friction, skin, start, boundary):
-    """The lines that all scripts share, and the words of a spring-dashpot with friction history that stand in each contact style."""
+    """The lines that all scripts share, and the words of a spring-dashpot with friction history that stand in each contact style. Several ranks
+    divide the area of a scene, so that each has as many grains."""
     rate = 2.0 * DAMPING * np.sqrt(stiffness / PAIR_MASS)
     words = f"hooke/history {stiffness:.10g} {2.0 / 7.0 * stiffness:.10g} {rate:.10g} {0.5 * rate:.10g} {friction} 1"
     return words, [
-        "units si", "atom_style sphere", f"boundary {boundary}", "newton on", "comm_modify vel yes", start,
+        "units si", "atom_style sphere", f"boundary {boundary}", "newton on", "processors * * 1", "comm_modify vel yes", start,
         f"pair_style gran/{words}", "pair_coeff * *", f"neighbor {skin} bin", "neigh_modify delay 0 every 1 check yes"]
 
 

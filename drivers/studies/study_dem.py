@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""Three processes beside smooth DEM (LAMMPS): what comes out, and processor seconds on one core.
+"""Three processes beside smooth DEM (LAMMPS): what comes out, and the seconds that it takes on one core or several.
 
-    ./gravier study dem [--quick] [--parts NAME...] [--lammps PROGRAM] [--out DIR]     a quarter of an hour, quick 2 minutes
+    ./gravier study dem [--quick] [--parts NAME...] [--ranks N] [--lammps PROGRAM] [--out DIR]     a quarter of an hour, quick 2 minutes
 
 The processes are spheres that settle in a box, simple shear at a pressure, and the discharge of the box through a slot. LAMMPS is the
 program lmp of PATH unless told; where it is not there, or with --lammps none, what Gravier finds is compared with stored figures of
 data/studies/dem.csv and seconds are not compared. It prints a row a quantity with what Gravier measured, what LAMMPS has and what is
 accepted, and a table of settings of Gravier with their seconds. Percentages behind a quantity are standard errors of both codes
-together, by batches of the run. Small scenes scatter more, and have wider bounds of physics. It ends with status 1 where a row is out
-of its bounds. With --out it leaves DIR/study_dem.csv, the settings, DIR/study_dem.md, both tables, and the runs; --record writes the
-stored figures anew."""
+together, by batches of the run. Seconds are those of the processor, and with --ranks, which both codes then have, those on the clock.
+Small scenes scatter more, and have wider bounds of physics. It ends with status 1 where a row is out of its bounds. With --out it
+leaves DIR/study_dem.csv, the settings, DIR/study_dem.md, both tables, and the runs; --record writes the stored figures anew."""
 import csv
 import datetime
 import os
@@ -43,8 +43,8 @@ PHASES = {"sweeps": ["sweeps"], "checks": ["residual checks", "reductions of the
 class Lammps:
     """Figures of LAMMPS: by the program, or stored ones."""
 
-    def __init__(self, program, scenes):
-        self.program, self.scenes, self.figures = program, scenes, {}
+    def __init__(self, program, scenes, ranks):
+        self.program, self.scenes, self.ranks, self.figures = program, scenes, ranks, {}
         if program is None:
             with open(STORED, encoding="ascii", newline="") as file:
                 rows = [row for row in csv.DictReader(file) if row["scenes"] == scenes]
@@ -61,7 +61,7 @@ class Lammps:
             # seconds of another machine are no measure
             return {quantity: value for quantity, value in self.figures[name].items() if quantity != SECONDS}
         place = process.place / name.replace(process.name, "lammps").replace(" ", "_")
-        seconds = run_lammps(self.program, place, process.script(*stiffer))
+        seconds = run_lammps(self.program, place, process.script(*stiffer), self.ranks)
         self.figures[name] = {**process.of_lammps(place, *stiffer), SECONDS: (seconds, 0.0)}
         return self.figures[name]
 
@@ -102,6 +102,7 @@ class Study:
 
     def __init__(self, lammps, quick):
         self.lammps, self.quick, self.table, self.rows = lammps, quick, Table(), []
+        self.ranks = lammps.ranks
 
     def bounds(self, compliant):
         bounds = COMPLIANT if compliant else RIGID
@@ -145,7 +146,7 @@ class Study:
     def measure(self, process, setting, directory, theirs, compliant=False):
         """What Gravier finds with a setting, with its seconds, and its log; a row of the table of settings beside what LAMMPS has."""
         case = process.case(setting, compliant=True) if compliant else process.case(setting)
-        seconds = run_gravier(process.place / directory, *case)
+        seconds = run_gravier(process.place / directory, *case, ranks=self.ranks)
         ours = {**process.of_gravier(process.place / directory, compliant), SECONDS: (seconds, 0.0)}
         log = Log(process.place / directory)
         within = all(abs(ours[name][0] / theirs[name][0] - 1.0) <= max(bound, 2.0 * relative_error(ours[name][1], *theirs[name][::-1]))
@@ -197,6 +198,7 @@ def main():
     parser = OneLineParser(prog="study_dem", description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="smaller scenes, one setting of each")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="processes (all)")
+    parser.add_argument("--ranks", metavar="N", type=whole(1), default=1, help="ranks of either code (1)")
     parser.add_argument("--lammps", metavar="PROGRAM", help="LAMMPS (lmp of PATH); none: stored figures")
     parser.add_argument("--seed", type=whole(0), default=1, help="of the radii and places at the start (1)")
     parser.add_argument("--out", metavar="DIR", type=Path, help="directory of the tables and the runs")
@@ -205,7 +207,9 @@ def main():
     program = find_lammps(options.lammps, parser.error)
     if options.record and program is None:
         parser.error("--record: expected LAMMPS on this machine")
-    lammps = Lammps(program, "small" if options.quick else "full")
+    if options.record and options.ranks > 1:
+        parser.error(f"--record with --ranks {options.ranks}: expected --ranks 1, by which stored figures are made")
+    lammps = Lammps(program, "small" if options.quick else "full", options.ranks)
     with tempfile.TemporaryDirectory() as passing:
         place = (claimed(options.out) if options.out else Path(passing)).resolve()
         study = Study(lammps, options.quick)
@@ -213,7 +217,8 @@ def main():
         processes = {"settling": settling, "shear": Shear(place, options.quick, options.seed),
                      "discharge": Discharge(place, options.quick, settling)}
         print(f"Gravier: {version()}\nLAMMPS: {lammps.source}")
-        print(f"on {processor()}, {datetime.date.today().isoformat()}, one core, user seconds\n", flush=True)
+        cores = "one core, user seconds" if options.ranks == 1 else f"{options.ranks} ranks, seconds on the clock"
+        print(f"on {processor()}, {datetime.date.today().isoformat()}, {cores}\n", flush=True)
         for name in PARTS:
             if name in options.parts:
                 study.play(processes[name])

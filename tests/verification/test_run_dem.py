@@ -77,9 +77,7 @@ class Scenes(unittest.TestCase):
 
     def test_data_file(self):
         """The grains of a bodies file and of a data file of LAMMPS are the same, to the digits of the latter."""
-        settling = scenes.Settling(self.place, True, 1)
-        settling.count = (3, 4, 5)
-        settling.prepare()
+        settling = self.settling(3, 4, 5)
         rows = (settling.place / "start.data").read_text(encoding="ascii").split("Atoms # sphere")[1].split()
         rows = np.array(rows, float).reshape(-1, 7)
         import h5py
@@ -87,6 +85,13 @@ class Scenes(unittest.TestCase):
             self.assertEqual(len(rows), settling.grains)
             np.testing.assert_allclose(rows[:, 4:], file["bodies/position"][:], rtol=1e-11)
             np.testing.assert_allclose(0.5 * rows[:, 2], file["bodies/radius"][:], rtol=1e-11)
+
+    def settling(self, *count):
+        settling = scenes.Settling(self.place, True, 1)
+        settling.width, settling.depth, settling.height = (number * scenes.CELL for number in count or (6, 6, 12))
+        settling.duration = 0.15
+        settling.prepare()
+        return settling
 
     def shear(self):
         shear = scenes.Shear(self.place, True, 1)
@@ -114,6 +119,21 @@ class Scenes(unittest.TestCase):
             # how much of the time has a name hangs on the machine; none of it is counted twice
             self.assertTrue(0.3 < log.share(*log.phases) < 1.05, log.phases)
 
+    def test_ranks(self):
+        """Grains that settle on two ranks have a subdomain each, and are as dense as those on one; what is said of a wrong case is its error, and not
+        the last words of the launcher."""
+        settling = self.settling()
+        found = []
+        for ranks in (1, 2):
+            place = settling.place / f"gravier{ranks}"
+            codes.run_gravier(place, *settling.case(settling.settings[0]), ranks=ranks)
+            self.assertIn(f"\nranks       {ranks}, subdomains {ranks} (grid {ranks} x 1 x 1", (place / "run.log").read_text(encoding="utf-8"))
+            found.append(settling.of_gravier(place, False)["solid fraction"][0])
+        self.assertAlmostEqual(found[1] / found[0], 1.0, delta=0.02)
+        with self.assertRaisesRegex(SystemExit, "ended with status 2: .*friction = -1"):
+            groups, boundaries = settling.case(settling.settings[0])
+            codes.run_gravier(settling.place / "wrong", {**groups, "scene": {**groups["scene"], "friction": -1.0}}, boundaries, ranks=2)
+
     @unittest.skipUnless(shutil.which("lmp"), "LAMMPS is not there")
     def test_scripts(self):
         """LAMMPS runs all three; a load of springs ten times as stiff has shorter steps."""
@@ -123,9 +143,7 @@ class Scenes(unittest.TestCase):
             values = shear.of_lammps(shear.place / f"lammps{times}", times)
             self.assertGreater(values["stress ratio"][0], 0.0)
             self.assertAlmostEqual(values["volume over that at the start"][0], 1.0, delta=0.01)
-        settling = scenes.Settling(self.place, True, 1)
-        settling.count, settling.duration = (5, 5, 8), 0.15
-        settling.prepare()
+        settling = self.settling()
         codes.run_lammps("lmp", settling.place / "lammps", settling.script())
         self.assertGreater(settling.of_lammps(settling.place / "lammps")["solid fraction"][0], 0.4)
         discharge = scenes.Discharge(self.place, True, settling)
@@ -155,6 +173,7 @@ class Command(unittest.TestCase):
     def test_command_line(self):
         for arguments, words in ((("--lammps", "no such program"), "--lammps no such program: expected LAMMPS, or none"),
                                  (("--lammps", "none", "--record"), "--record: expected LAMMPS on this machine"),
+                                 (("--ranks", "0"), "--ranks"), (("--ranks", "2", "--record", "--lammps", shutil.which("lmp") or "none"), "--record"),
                                  (("--parts", "walking"), "invalid choice: 'walking'")):
             run = self.run_study(*arguments)
             self.assertEqual((run.returncode, len(run.stderr.strip().splitlines())), (2, 1), run.stderr)
