@@ -49,7 +49,8 @@ contains
   end function repartition_rule_text
 
   !> Whether step `step` starts from a new partition: because one is overdue, by schedule, or because contacts lie unevenly, and
-  !> more so than just after the last one: what that could not cure is not tried again.
+  !> more so than just after the last one. What that could not cure is tried again, ever more rarely: grains that fall or flow on
+  !> may have made it curable.
   pure logical function repartition_is_due(rule, step, imbalance, reached) result(due)
     type(repartition_rule_t), intent(in) :: rule
     integer, intent(in) :: step
@@ -59,8 +60,21 @@ contains
     due = rule%overdue
     if (step == 0 .or. rule%subdomains == 1 .or. due) return
     if (rule%every > 0) due = mod(step, rule%every) == 0
-    if (rule%imbalance > 0.0_dp) due = due .or. imbalance > max(rule%imbalance, worth_dividing*reached)
+    if (rule%imbalance > 0.0_dp .and. imbalance > rule%imbalance) due = due .or. imbalance > worth_dividing*reached .or. &
+      & is_one_of_few(step)
   end function repartition_is_due
+
+  !> Whether a step is one of 16, 20, 24, 28, 32, 40, 48, 56, 64, 80 ...: four in each doubling.
+  pure logical function is_one_of_few(step) result(is)
+    integer, intent(in) :: step
+    integer :: n
+
+    n = step
+    do while (n >= 8 .and. mod(n, 2) == 0)
+      n = n/2
+    end do
+    is = step >= 16 .and. n < 8
+  end function is_one_of_few
 
   !> Divide space for the grains given. Collective.
   subroutine divide(rule, halo, bodies, decomposition, error)

@@ -47,8 +47,12 @@ program test_time_stepper
 
 contains
 
-  !> By schedule; by an imbalance that exceeds the limit and 1.1 times what the last division reached; never in step 0 or alone.
+  !> By schedule; by an imbalance that exceeds the limit and 1.1 times what the last division reached, or in a few steps
+  !> the limit alone; never in step 0 or alone.
   subroutine test_division()
+    integer, parameter :: again(13) = [16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128]
+    integer :: n, step
+
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4), 7, 9.0_dp, 1.0_dp), "never without a rule")
     call check(repartition_is_due(repartition_rule_t(subdomains=4, every=5), 10, 1.0_dp, 1.0_dp), "each fifth step")
     call check(repartition_is_due(repartition_rule_t(subdomains=4, overdue=.true.), 7, 1.0_dp, 1.0_dp), "overdue")
@@ -60,6 +64,15 @@ contains
     call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.7_dp, 1.6_dp), &
       & "tried in vain before")
     call check(repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), 3, 1.8_dp, 1.6_dp), "worse than reached")
+    n = 0
+    do step = 1, 128
+      if (.not. repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), step, 1.7_dp, 1.6_dp)) cycle
+      n = n + 1
+      call check_close(real(step, dp), real(again(min(n, size(again))), dp), 0.0_dp, "what was not cured is tried again")
+      call check(.not. repartition_is_due(repartition_rule_t(subdomains=4, imbalance=1.5_dp), step, 1.4_dp, 1.6_dp), &
+        & "even enough again")
+    end do
+    call check(n == size(again), "how often it is tried again")
   end subroutine test_division
 
   !> A box of 2 by 4 m whose right side forces move along x, and a segment of 1.5 m that they move along y.
