@@ -190,6 +190,43 @@ class ShapeLaws(RunTestCase):
                         velocity = self.track(run, "velocity")[-1]
                         np.testing.assert_allclose(velocity, [2.0 - 0.06 * friction * G] + [0.0] * (3 * dimension - 4), atol=2e-5)
 
+    def test_joints_of_meshes(self):
+        """A block, a capsule and a cluster of balls slide over the flush rim of a mesh, from another mesh, from a sheet, or within a mesh over a gap that
+        its file has, and keep their velocity. They lost half of it. A step up stops a block."""
+        balls = {2: "disk -0.15 0 0.1\ndisk 0.15 0 0.1\n", 3: "sphere -0.15 0 0 0.1\nsphere 0.15 0 0 0.1\n"}
+        shapes = {"cluster": "shape cluster\n", "rod": "shape rod\n"}
+        for dimension in (2, 3):
+            files = {}
+            for name, parts in (("one", [(-1.0, 0.0, 0.0)]), ("other", [(0.0, 1.0, 0.0)]), ("gap", [(-1.0, 0.0, 0.0), (2e-7, 1.0, 0.0)]),
+                                ("step", [(-1.0, 0.0, 0.0), (0.0, 1.0, 0.02)])):
+                files[name] = write(f"{self.scratch}/{name}{dimension}.obj", "".join(self.stretch(dimension, k, *part) for k, part in enumerate(parts)))
+            mesh = {name: {"shape": "mesh", "file": path} for name, path in files.items()}
+            sheet = {"shape": "segment", "point": [-1.0, 0.0], "end": [0.0, 0.0]} if dimension == 2 else \
+                {"shape": "rectangle", "point": [-1.0, -0.5, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, 1.0, 0.0]}
+            library = BLOCK[dimension] + shapes["cluster"] + balls[dimension] + shapes["rod"] + \
+                ("capsule -0.15 0 0.15 0 0.1\n" if dimension == 2 else "capsule -0.15 0 0 0.15 0 0 0.1\n")
+            for shape, grounds in (("block", {"meshes": ["one", "other"], "sheet": [sheet, "other"], "gap": ["gap"], "step": ["step"]}),
+                                   ("rod", {"meshes": ["one", "other"]}), ("cluster", {"meshes": ["one", "other"]})):
+                for name, walls in grounds.items():
+                    with self.subTest(shape, dimension=dimension, ground=name):
+                        start = body(shape, up(dimension, 0.1, -0.25), STILL[dimension], [2.0] + [0.0] * (dimension - 1), scale=1.0)
+                        run = self.play(f"{shape} {name} {dimension}", dimension, [start], [mesh.get(wall, wall) if isinstance(wall, str) else wall for wall in walls],
+                                        {"scene": {"gravity": up(dimension, -G), "friction": 0.0}, "time": {"step": 1e-3, "steps": 150}, "output": {"every": 150}},
+                                        library=library)
+                        velocity = self.track(run, "velocity")[-1]
+                        if name == "step":
+                            self.assertLess(velocity[0], 1.5)
+                        else:
+                            np.testing.assert_allclose(velocity, [2.0] + [0.0] * (3 * dimension - 4), atol=2e-5)
+
+    @staticmethod
+    def stretch(dimension, number, first, last, height):
+        """A level stretch of an OBJ file, as the part of this number, from 0."""
+        if dimension == 2:
+            return f"v {first} {height} 0\nv {last} {height} 0\nl {2 * number + 1} {2 * number + 2}\n"
+        corners = "".join(f"v {x} {y} {height}\n" for x, y in ((first, -0.5), (last, -0.5), (last, 0.5), (first, 0.5)))
+        return corners + "f " + " ".join(str(4 * number + k) for k in (1, 2, 3, 4)) + "\n"
+
     def test_rebound(self):
         """A block that falls flat rebounds with e times its speed and without spin. One that falls on a corner keeps its angular momentum
         about that corner, and leaves with e times the speed of the corner."""

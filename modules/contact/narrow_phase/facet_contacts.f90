@@ -32,6 +32,9 @@ module gravier_facet_contacts
     !> number of the facet, or of the nearest of several (n)
     integer, allocatable :: facet(:)
     type(manifold_t), allocatable :: manifold(:)
+    !> corners of the facet, where the piece touches its edge with this edge as far as the wall goes on along it, in the axes of the
+    !> manifold; in the plane the first two (3, 3, n) [m]
+    real(dp), allocatable :: corner(:, :, :)
     type(facet_candidates_t), private :: candidates
     type(convex_piece_t), private :: sheet
   contains
@@ -40,24 +43,30 @@ module gravier_facet_contacts
 
 contains
 
-  pure subroutine facet_contacts_add(self, facet, manifold)
+  pure subroutine facet_contacts_add(self, facet, corner, manifold)
     class(facet_contacts_t), intent(inout) :: self
     integer, intent(in) :: facet
+    !> of the facet (3, 2 or 3) [m]
+    real(dp), intent(in), contiguous :: corner(:, :)
     type(manifold_t), intent(in) :: manifold
     integer, allocatable :: longer_facet(:)
     type(manifold_t), allocatable :: longer(:)
+    real(dp), allocatable :: longer_corner(:, :, :)
 
-    if (.not. allocated(self%facet)) allocate (self%facet(8), self%manifold(8))
+    if (.not. allocated(self%facet)) allocate (self%facet(8), self%manifold(8), self%corner(3, 3, 8))
     if (self%n == size(self%facet)) then
-      allocate (longer_facet(2*self%n), longer(2*self%n))
+      allocate (longer_facet(2*self%n), longer(2*self%n), longer_corner(3, 3, 2*self%n))
       longer_facet(1:self%n) = self%facet
       longer(1:self%n) = self%manifold
+      longer_corner(:, :, 1:self%n) = self%corner
       call move_alloc(longer_facet, self%facet)
       call move_alloc(longer, self%manifold)
+      call move_alloc(longer_corner, self%corner)
     end if
     self%n = self%n + 1
     self%facet(self%n) = facet
     self%manifold(self%n) = manifold
+    self%corner(:, 1:size(corner, 2), self%n) = corner
   end subroutine facet_contacts_add
 
   !> The contacts of a disk or a ball: one with each facet that it touches within, one with each side or corner that sticks out.
@@ -105,7 +114,7 @@ contains
         manifold%gap(1) = item%distance - radius
         manifold%point(:, 1) = item%foot + 0.5_dp*manifold%gap(1)*item%normal
         manifold%cores_overlap = .not. item%distance > 0.0_dp
-        call found%add(near%number(item%place), manifold)
+        call found%add(near%number(item%place), near%corner(:, :, item%place), manifold)
       end associate
     end do
   end subroutine find_ball_contacts
@@ -150,7 +159,8 @@ contains
       associate (item => found%candidates%item(found%candidates%order(k)))
         if (item%dropped) cycle
         call drop_joint(found%candidates, k, near, tolerance_for(near, piece%rounding), manifold(item%place))
-        if (manifold(item%place)%n > 0) call found%add(near%number(item%place), manifold(item%place))
+        if (manifold(item%place)%n > 0) &
+          & call found%add(near%number(item%place), near%corner(:, :, item%place), manifold(item%place))
       end associate
     end do
   end subroutine find_polygon_contacts
@@ -193,10 +203,10 @@ contains
     end associate
   end subroutine drop_joint
 
-  !> Of a side that leans over a segment or a rectangle whose nearest edge is in a joint, keep the corners of the body that lie over
-  !> it: they stand on it once the side turns.
+  !> Of a side that leans over a segment, a facet or a rectangle whose nearest edge is in a joint, keep the corners of the body that
+  !> lie over it: they stand on it once the side turns.
   pure subroutine keep_corners(corners, tolerance, slack, manifold)
-    !> of the segment or rectangle, from where the manifold is seen (3, 2 or 4) [m]
+    !> of the segment, facet or rectangle, from where the manifold is seen (3, 2 to 4) [m]
     real(dp), intent(in) :: corners(:, :)
     !> distance from its edges within which points are on them [m]; slope below which points are as deep as the deepest
     real(dp), intent(in) :: tolerance, slack
@@ -215,9 +225,9 @@ contains
       kept = manifold%gap(c) - least > slack*norm2(foot - deepest)
       do e = 1, size(corners, 2)
         to_edge(:) = corners(:, e) - foot
-        if (size(corners, 2) == 4) then
+        if (size(corners, 2) > 2) then
           edge(:, 1) = to_edge
-          edge(:, 2) = corners(:, mod(e, 4) + 1) - foot
+          edge(:, 2) = corners(:, mod(e, size(corners, 2)) + 1) - foot
           call find_foot(edge, to_edge, where_foot_is)
         end if
         kept = kept .and. norm2(to_edge) > tolerance
@@ -256,7 +266,7 @@ contains
     type(core_distance_t) :: distance(near%n)
     type(placed_pair_t) :: pair
     type(manifold_t) :: manifold
-    real(dp) :: corner(3, 3, near%n)
+    real(dp) :: corner(3, 3, near%n), reached(3, 3)
     integer :: k, n, pass
 
     found%n = 0
@@ -289,7 +299,8 @@ contains
             call find_patch(piece, found%sheet, pair, distance(item%place), alert, most, manifold)
           end if
           if (item%beside > 0) call leave_plane(near, item%beside, radius*piece%rounding, manifold)
-          if (manifold%n > 0) call found%add(near%number(item%place), manifold)
+          reached(:, :) = radius*found%sheet%vertex
+          if (manifold%n > 0) call found%add(near%number(item%place), reached, manifold)
         end associate
       end do
     end do

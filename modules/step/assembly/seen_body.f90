@@ -7,7 +7,7 @@ module gravier_seen_body
   use gravier_manifold, only: manifold_t
   implicit none
   private
-  public :: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
+  public :: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets, turn_corners
 
   !> A body, seen from the centre of the candidate.
   type :: seen_body_t
@@ -105,5 +105,21 @@ contains
       call turned%add(near%number(k), corner)
     end do
   end subroutine turn_facets
+
+  !> Turn corners of a facet back from the axes of the body.
+  pure subroutine turn_corners(axes, corner)
+    real(dp), intent(in) :: axes(3, 3)
+    !> (3, 3)
+    real(dp), intent(inout) :: corner(:, :)
+    real(dp) :: turned(3)
+    integer :: c, d
+
+    do c = 1, 3
+      do d = 1, 3
+        turned(d) = sum(axes(d, :)*corner(:, c))
+      end do
+      corner(:, c) = turned
+    end do
+  end subroutine turn_corners
 
 end module gravier_seen_body

@@ -12,11 +12,12 @@ module gravier_shape_contacts
     & keep_corners
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
-  use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets
+  use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets, turn_corners
   use gravier_surface_velocity, only: add_image_velocity
   use gravier_piece_meeting, only: room_t, nearest_t, meet_pieces, find_nearest_points
   use gravier_clear_path, only: clear_path
   use gravier_wall_joints, only: is_in_joint
+  use gravier_wall_sheet, only: wall_sheet_t, level
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
@@ -26,9 +27,8 @@ module gravier_shape_contacts
   real(dp), parameter :: same = 1.0e-6_dp
   !> largest distance of points at a seam, over the rounding of a piece
   real(dp), parameter :: two_roundings = 2.01_dp
-  !> distance, over the rounding of a piece, within which points of two boundaries are one; sine of the slope of a boundary at and
-  !> below which it is level
-  real(dp), parameter :: one_place = 1.0e-3_dp, level = 1.0e-3_dp
+  !> distance, over the rounding of a piece, within which points of two boundaries are one
+  real(dp), parameter :: one_place = 1.0e-3_dp
 
   !> Where contacts attract or yield, corners of a patch that are this near to the line of their neighbours, over the radius, are
   !> left out. Two faces that have shifted a little then have as many attractions or springs as before.
@@ -196,7 +196,7 @@ contains
     associate (boundary => decomposition%boundaries(j))
       if (.not. boundary%present) return
       if (boundary%is_faceted()) then
-        call touch_mesh(decomposition%shapes, a, centre, boundary, work, points)
+        call touch_mesh(decomposition, a, centre, j, work, points)
       else
         call touch_surface(decomposition, a, centre, j, work, points)
       end if
@@ -204,25 +204,56 @@ contains
   end subroutine touch_boundary
 
   !> The points with a boundary of facets.
-  subroutine touch_mesh(shapes, a, centre, boundary, work, points)
-    type(shape_library_t), intent(in) :: shapes
+  subroutine touch_mesh(decomposition, a, centre, j, work, points)
+    type(decomposition_t), intent(in) :: decomposition
     type(seen_body_t), intent(in) :: a
     !> of the body (nd) [m]
     real(dp), intent(in), contiguous :: centre(:)
-    type(boundary_t), intent(in) :: boundary
+    !> number of the boundary
+    integer, intent(in) :: j
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
     integer :: k
 
-    call boundary%find_facets(centre, a%radius + work%alert, work%near)
-    do k = 1, n_pieces(shapes, a)
+    call decomposition%boundaries(j)%find_facets(centre, a%radius + work%alert, work%near)
+    do k = 1, n_pieces(decomposition%shapes, a)
       if (work%near%n == 0) exit
       if (a%shape == 0) then
-        call touch_facets(work%ball, a, k, size(centre), work%alert, work, points)
+        call touch(work%ball)
       else
-        call touch_facets(shapes%shape(a%shape)%piece(k), a, k, size(centre), work%alert, work, points)
+        call touch(decomposition%shapes%shape(a%shape)%piece(k))
       end if
     end do
+
+  contains
+
+    subroutine touch(piece)
+      type(convex_piece_t), intent(in) :: piece
+      integer :: l
+
+      call find_facet_contacts(piece, a, size(centre), work)
+      do l = 1, work%facets%n
+        call pass_rim(piece, work%facets%corner(:, 1:size(centre), l), work%facets%manifold(l))
+        call points%add(work%facets%manifold(l), k, mod(work%facets%facet(l), feature_base))
+      end do
+    end subroutine touch
+
+    !> The rim of a mesh is no obstacle where another boundary goes on, nor to what goes past it.
+    subroutine pass_rim(piece, corners, manifold)
+      type(convex_piece_t), intent(in) :: piece
+      !> of the facet, with its edge as far as the wall goes on along it
+      real(dp), intent(in), contiguous :: corners(:, :)
+      type(manifold_t), intent(inout) :: manifold
+      type(wall_sheet_t) :: sheet
+      real(dp) :: of_facet(3)
+
+      call find_facet_normal(corners, of_facet)
+      if (norm2(manifold%normal - dot_product(manifold%normal, of_facet)*of_facet) <= level) return
+      call sheet%init(decomposition%boundaries(j), j, centre, corners)
+      call leave_joints(decomposition, centre, piece, a, sheet, work, manifold)
+      if (work%step > 0.0_dp) call clear_path(piece, sheet%piece, work%step, a, sheet%seen, work%ahead, manifold)
+    end subroutine pass_rim
+
   end subroutine touch_mesh
 
   !> The points with a plane, a surface that ends at straight edges, or one that is round.
@@ -235,21 +266,15 @@ contains
     integer, intent(in) :: j
     type(shape_work_t), intent(inout) :: work
     type(pair_points_t), intent(inout) :: points
-    type(convex_piece_t) :: sheet
-    type(seen_body_t) :: seen_sheet
-    real(dp) :: normal(size(centre)), place(size(centre)), distance, corners(3, 4)
+    type(wall_sheet_t) :: sheet
+    real(dp) :: normal(size(centre)), distance, corners(3, 4)
     integer :: k, n
 
     associate (boundary => decomposition%boundaries(j))
       call boundary%locate(centre, distance, normal)
       if (distance - a%radius > work%alert) return
       call boundary%find_corners(centre, n, corners)
-      if (n > 0) then
-        call make_sheet(size(centre), corners(:, 1:n), sheet, seen_sheet)
-        place(:) = centre + seen_sheet%centre(1:size(centre))
-        call boundary%last_velocity_at(place, seen_sheet%velocity(1:size(centre)))
-        seen_sheet%spin(:) = boundary%last_spin
-      end if
+      if (n > 0) call sheet%init(boundary, j, centre, corners(:, 1:n))
     end associate
     do k = 1, n_pieces(decomposition%shapes, a)
       if (a%shape == 0) then
@@ -269,9 +294,9 @@ contains
         if (boundary%is_plane()) then
           call touch_plane(piece, a, normal, distance, work%alert, work%room%a, manifold)
         else if (n > 0) then
-          call meet_pieces(piece, sheet, a, seen_sheet, work%alert, work%room, manifold)
-          call leave_joints(piece, manifold)
-          if (work%step > 0.0_dp) call clear_path(piece, sheet, work%step, a, seen_sheet, work%ahead, manifold)
+          call meet_pieces(piece, sheet%piece, a, sheet%seen, work%alert, work%room, manifold)
+          call leave_joints(decomposition, centre, piece, a, sheet, work, manifold)
+          if (work%step > 0.0_dp) call clear_path(piece, sheet%piece, work%step, a, sheet%seen, work%ahead, manifold)
         else
           call touch_round_surface(piece, a, centre, boundary, work%alert, k, points)
           return
@@ -280,54 +305,57 @@ contains
       call points%add(manifold, k, 1)
     end subroutine touch
 
-    !> Where a side leans over the sheet and touches its edge, it is not stopped there if the wall goes on upwards.
-    subroutine leave_joints(piece, manifold)
-      type(convex_piece_t), intent(in) :: piece
-      type(manifold_t), intent(inout) :: manifold
-      type(nearest_t) :: near
-      real(dp) :: of_sheet(3), edge(size(centre)), tolerance
-
-      if (manifold%n == 0) return
-      call find_facet_normal(corners(:, 1:min(n, 3)), of_sheet)
-      if (norm2(manifold%normal - dot_product(manifold%normal, of_sheet)*of_sheet) <= level) return
-      call find_nearest_points(piece, sheet, a, seen_sheet, work%room, near)
-      if (near%overlap) return
-      tolerance = one_place*a%radius*piece%rounding
-      edge(:) = centre + near%point(1:size(centre)) - 0.5_dp*(near%gap + a%radius*piece%rounding)*near%normal(1:size(centre))
-      if (is_in_joint(decomposition%boundaries, j, edge, manifold%normal, tolerance, level)) &
-        & call keep_corners(corners(:, 1:n), tolerance, level, manifold)
-    end subroutine leave_joints
-
   end subroutine touch_surface
 
-  !> The points of a piece with the facets near its body.
-  subroutine touch_facets(piece, a, number, nd, alert, work, points)
+  !> Where a side leans over a sheet and touches its edge, it is not stopped there if the wall goes on upwards.
+  subroutine leave_joints(decomposition, centre, piece, a, sheet, work, manifold)
+    type(decomposition_t), intent(in) :: decomposition
+    !> of the body (nd) [m]
+    real(dp), intent(in), contiguous :: centre(:)
     type(convex_piece_t), intent(in) :: piece
     type(seen_body_t), intent(in) :: a
-    !> of the piece
-    integer, intent(in) :: number, nd
-    real(dp), intent(in) :: alert
+    type(wall_sheet_t), intent(in) :: sheet
     type(shape_work_t), intent(inout) :: work
-    type(pair_points_t), intent(inout) :: points
-    real(dp) :: centre(3)
+    type(manifold_t), intent(inout) :: manifold
+    type(nearest_t) :: near
+    real(dp) :: edge(size(centre)), tolerance
+
+    if (manifold%n == 0) return
+    if (.not. sheet%leans_at_edge(manifold%normal)) return
+    call find_nearest_points(piece, sheet%piece, a, sheet%seen, work%room, near)
+    if (near%overlap) return
+    tolerance = one_place*a%radius*piece%rounding
+    edge(:) = centre + near%point(1:size(centre)) - 0.5_dp*(near%gap + a%radius*piece%rounding)*near%normal(1:size(centre))
+    if (is_in_joint(decomposition%boundaries, sheet%boundary, edge, manifold%normal, tolerance, level)) &
+      & call keep_corners(sheet%corner, tolerance, level, manifold)
+  end subroutine leave_joints
+
+  !> The contacts of a piece with the facets near its body, in global axes.
+  subroutine find_facet_contacts(piece, a, nd, work)
+    type(convex_piece_t), intent(in) :: piece
+    type(seen_body_t), intent(in) :: a
+    integer, intent(in) :: nd
+    !> `near` is set, and `facets` afterwards
+    type(shape_work_t), intent(inout) :: work
+    real(dp) :: vertex(3)
     integer :: k
 
     if (size(piece%vertex, 2) == 1) then
-      call turn_vertex(piece%vertex(:, 1), a, centre)
-      call find_ball_contacts(centre, a%radius*piece%rounding, work%near, alert, work%facets)
+      call turn_vertex(piece%vertex(:, 1), a, vertex)
+      call find_ball_contacts(vertex, a%radius*piece%rounding, work%near, work%alert, work%facets)
     else if (nd == 2) then
       work%room%a%reaches_out = piece%reaches_out
       call place_piece(piece%vertex, piece%corner, piece%rounding, a%radius, a%angle, a%centre(1:2), work%room%a)
-      call find_polygon_contacts(work%room%a, work%near, alert, work%facets)
+      call find_polygon_contacts(work%room%a, work%near, work%alert, work%facets)
     else
       call turn_facets(a%axes, work%near, work%turned)
-      call find_polyhedron_contacts(piece, a%radius, work%turned, alert, face_points(piece), work%facets)
+      call find_polyhedron_contacts(piece, a%radius, work%turned, work%alert, face_points(piece), work%facets)
+      do k = 1, work%facets%n
+        call turn_manifold(a%axes, work%facets%manifold(k))
+        call turn_corners(a%axes, work%facets%corner(:, :, k))
+      end do
     end if
-    do k = 1, work%facets%n
-      if (nd == 3 .and. size(piece%vertex, 2) > 1) call turn_manifold(a%axes, work%facets%manifold(k))
-      call points%add(work%facets%manifold(k), number, mod(work%facets%facet(k), feature_base))
-    end do
-  end subroutine touch_facets
+  end subroutine find_facet_contacts
 
   subroutine touch_plane(piece, a, normal, distance, alert, placed, manifold)
     type(convex_piece_t), intent(in) :: piece
@@ -448,53 +476,5 @@ contains
     n = 1
     if (seen%shape > 0) n = size(shapes%shape(seen%shape)%piece)
   end function n_pieces
-
-  !> A segment or a rectangle as a piece without rounding, with one face to either side.
-  pure subroutine make_sheet(nd, corners, sheet, seen)
-    integer, intent(in) :: nd
-    !> from the centre of the candidate, in order around it (3, 2 or 4) [m]
-    real(dp), intent(in) :: corners(:, :)
-    type(convex_piece_t), intent(out) :: sheet
-    type(seen_body_t), intent(out) :: seen
-    integer :: k, n
-
-    n = size(corners, 2)
-    seen%shape = 1
-    seen%centre(:) = sum(corners, dim=2)/n
-    do k = 1, 3
-      seen%axes(k, k) = 1.0_dp
-    end do
-    do k = 1, n
-      seen%radius = max(seen%radius, norm2(corners(:, k) - seen%centre))
-    end do
-    allocate (sheet%vertex(nd, n))
-    do k = 1, n
-      sheet%vertex(:, k) = (corners(1:nd, k) - seen%centre(1:nd))/seen%radius
-    end do
-    sheet%corner = sheet%vertex
-    if (nd == 2) return
-    sheet%face_first = [1, 5, 9]
-    sheet%face_vertex = [1, 2, 3, 4, 4, 3, 2, 1]
-    sheet%neighbour_first = [1, 3, 5, 7, 9]
-    sheet%neighbour = [2, 4, 1, 3, 2, 4, 1, 3]
-    call list_faces(sheet)
-    allocate (sheet%face_normal(3, 2))
-    sheet%face_normal(1, 1) = across(2, 3)
-    sheet%face_normal(2, 1) = across(3, 1)
-    sheet%face_normal(3, 1) = across(1, 2)
-    sheet%face_normal(:, 1) = sheet%face_normal(:, 1)/norm2(sheet%face_normal(:, 1))
-    sheet%face_normal(:, 2) = -sheet%face_normal(:, 1)
-
-  contains
-
-    !> A component of the cross product of the edges at the first corner.
-    pure real(dp) function across(d, e)
-      integer, intent(in) :: d, e
-
-      across = (corners(d, 2) - corners(d, 1))*(corners(e, 4) - corners(e, 1)) &
-        & - (corners(e, 2) - corners(e, 1))*(corners(d, 4) - corners(d, 1))
-    end function across
-
-  end subroutine make_sheet
 
 end module gravier_shape_contacts
