@@ -1,30 +1,34 @@
 #!/usr/bin/env python3
 """Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls,
-discharge through outlets."""
+discharge through outlets, contact forces and anisotropy."""
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "python"))
+DRIVERS = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(DRIVERS / "python"))
 try:
     import numpy
 
     import gravier
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
+from gravier.force_networks import directions_of, distribution_of, networks, table_of  # noqa: E402
 from gravier.wall_tests import stresses_from  # noqa: E402
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
-from whole_file import claim, written  # noqa: E402
+from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
-HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,"}
+HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,",
+         "forces": b"step,time,contacts,normal_mean,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
-         "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s"}
+         "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
+         "normal_mean": "N", "angle_c": "degrees", "angle_n": "degrees", "angle_t": "degrees"}
 
 
 def parse(arguments):
     parser = OneLineParser(prog="gravier_measure", description=__doc__)
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow", parser_class=OneLineParser)
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow | forces", parser_class=OneLineParser)
     mixing = kinds.add_parser("mixing", help="Lacey's index and segregation of two kinds of grains, in each written state")
     mixing.add_argument("--by", default="size", metavar="WHAT", help="size, material, or x, y, z: where grains were at the start (size)")
     mixing.add_argument("--value", metavar="V", help="the first kind has radii above V [m] (middle of the radii), is of material V (the second), or began above V [m] "
@@ -39,9 +43,19 @@ def parse(arguments):
     walls.add_argument("--axial", metavar="AXIS", help="axis of the load (the last one)")
     walls.add_argument("--lateral", metavar="AXES", help="axes whose mean stress the axial one is compared with (all others)")
     outflow = kinds.add_parser("outflow", help="number and mass of the grains that have left through outlets, and their rates")
+    forces = kinds.add_parser("forces", help="distribution of contact forces, coordination, anisotropies and the strength that they make, in written states with contacts")
+    forces.add_argument("--region", metavar="NAME", help="contacts and grains in this &region of the case (all)")
+    forces.add_argument("--box", type=finite, nargs="+", metavar="X0", help="contacts and grains in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
+    forces.add_argument("--friction", type=positive, metavar="MU", help="coefficient of friction of all contacts between grains (that of the case)")
+    forces.add_argument("--mean", type=whole(1), default=1, metavar="N", help="N states after each other make a row in the place of single ones")
+    forces.add_argument("--distribution", type=Path, metavar="FILE", help="a table of the distribution of forces of all states, .csv")
+    forces.add_argument("--width", type=positive, default=0.2, metavar="W", help="of its bins, in forces over their mean (0.2)")
+    forces.add_argument("--directions", type=Path, metavar="FILE", help="a table of contacts and forces of all states by direction, .csv")
+    forces.add_argument("--bins", type=whole(1), metavar="N", help="of directions (18 over half a turn, in space 9 over a quarter)")
+    forces.add_argument("--plot", type=Path, metavar="FILE", help="a picture of both, .png or .svg (needs matplotlib)")
     for kind in (walls, outflow):
         kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
-    for kind in (mixing, heap, walls, outflow):
+    for kind in (mixing, heap, walls, outflow, forces):
         kind._negative_number_matcher = NEGATIVE
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
         kind.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
@@ -59,12 +73,45 @@ def measure(run, options):
     return gravier.wall_test(run, options.axial, options.lateral, options.mean, options.since)
 
 
-def said(table, run, options):
-    """The last row in words, and of a test its strength."""
+def measure_forces(run, options):
+    """The tables of the forces by kind, and the row of all states together."""
+    found = networks(run, options.region, options.box, options.friction, options.since)
+    tables = {"forces": table_of(found, options.mean)}
+    if options.distribution or options.plot:
+        tables["distribution"] = distribution_of(found, options.width)
+    if options.directions or options.plot:
+        tables["directions"] = directions_of(found, options.bins)
+    return tables, table_of(found, len(found))
+
+
+def draw(tables, together, dimension, path):
+    """The picture of the forces; matplotlib and the modules of gravier_plot are loaded only here."""
+    sys.path.insert(0, str(DRIVERS / "plot"))
+    try:
+        import matplotlib
+        matplotlib.use("Agg")
+        import matplotlib.pyplot as plt
+    except ImportError as missing:
+        raise gravier.ResultsError(f"{missing}; expected a python3 with matplotlib (apt install python3-matplotlib), or no --plot") from None
+    from force_pictures import draw_forces
+    from picture_style import SETTINGS, PictureError, save_picture
+    plt.rcParams.update(SETTINGS)
+    try:
+        save_picture(draw_forces(tables["distribution"], tables["directions"], together.beta[0], dimension), path)
+    except PictureError as refused:
+        raise gravier.ResultsError(str(refused)) from None
+
+
+def in_words(row, run):
+    """A row of a table: its names, values and units. Components of tensors and of directions in space are in the table alone."""
     unit = "N/m" if run.dimension == 2 else "Pa"
-    last = [f"{name.replace('_', ' ')} {values[-1]:.4g} {UNITS.get(name) or (unit if name.endswith('_stress') else '')}".rstrip()
-            for name, values in table.items() if name != "step"]
-    lines = [f"last row: {', '.join(last)}"]
+    return ", ".join(f"{name.replace('_', ' ')} {value:.4g} {UNITS.get(name) or (unit if name.endswith('_stress') else '')}".rstrip()
+                     for name, value in row.items() if name != "step" and not name.startswith(("fabric_", "axis_")))
+
+
+def said(table, run, options, together=None):
+    """The last row in words, of a test its strength, and of forces those of all states."""
+    lines = [f"last row: {in_words({name: values[-1] for name, values in table.items()}, run)}"]
     if options.kind == "walls":
         sine = numpy.where(numpy.isfinite(table.sin_phi), table.sin_phi, -numpy.inf)
         # the mean of a ratio is not that of the means
@@ -72,24 +119,37 @@ def said(table, run, options):
         axial, lateral = table.axial_stress[first:].mean(), table.lateral_stress[first:].mean()
         lines.append(f"sin phi: largest {sine[peak]:.3g} at an axial strain of {table.axial_strain[peak]:.4g}, of the means of the last {len(table) - first} rows "
                      f"{(axial - lateral) / (axial + lateral):.3g}; stresses are {stresses_from(run)}")
+    if together:
+        lines.append(f"all states: {in_words({name: values[0] for name, values in together.items() if name != 'time'}, run)}")
     return lines
 
 
 def main(arguments=None):
     options = parse(arguments)
-    out = options.out or options.directory / f"{options.kind}.csv"
-    kinds = {".csv": HEADS[options.kind]}
-    claim(out, kinds)
+    places = {options.kind: options.out or options.directory / f"{options.kind}.csv"}
+    places.update({name: getattr(options, name, None) for name in ("distribution", "directions") if getattr(options, name, None)})
+    for name, place in places.items():
+        claim(place, {".csv": HEADS[name]})
+    picture = getattr(options, "plot", None)
+    if picture:
+        claim(picture, PICTURES)
+    together = None
     try:
         run = gravier.Run(options.directory)
-        table = measure(run, options)
-        lines = said(table, run, options)
+        if options.kind == "forces":
+            tables, together = measure_forces(run, options)
+        else:
+            tables = {options.kind: measure(run, options)}
+        lines = said(tables[options.kind], run, options, together)
+        if picture:
+            draw(tables, together, run.dimension, picture)
     except gravier.ResultsError as refused:
         print(f"gravier_measure: error: {plain(refused)}", file=sys.stderr)
         return 2
-    with written(out, kinds) as part:
-        gravier.write_table(part, table, 9)
-    print("\n".join([*lines, str(out)]))
+    for name, place in places.items():
+        with written(place, {".csv": HEADS[name]}) as part:
+            gravier.write_table(part, tables[name], 9)
+    print("\n".join([*lines, *map(str, places.values()), *([str(picture)] if picture else [])]))
     return 0
 
 

@@ -19,7 +19,7 @@ STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
-         (r"force_[xyz]:|force_mean|force_max", "N"), (r"moment_[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
+         (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
          (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
          (r"gravity_[xyz]", "m/s²"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there

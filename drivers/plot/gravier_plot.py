@@ -19,8 +19,8 @@ from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
 from one_line import NEGATIVE, OneLineParser, plain, run_tool
 from packing_picture import COLOURS, draw_packing
-from picture_style import PictureError
-from whole_file import PICTURES, claim, save_figure
+from picture_style import SETTINGS, PictureError, save_picture
+from whole_file import PICTURES, claim
 
 
 #: along the longer side of a picture in dots: its memory is the square of them
@@ -33,13 +33,6 @@ def refuse(message):
     """One line, and the status of bad input."""
     print(f"gravier_plot: {message}", file=sys.stderr)
     sys.exit(2)
-
-
-def save(figure, path, dpi=200):
-    """PNG or SVG, by the ending of the path, without what would tell when."""
-    save_figure(figure, path, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
-    plt.close(figure)
-    print(path)
 
 
 def steps_of(text):
@@ -133,22 +126,25 @@ def draw(options):
         if options.view and runs[0].dimension == 2:
             raise PictureError(f"{directories[0]}: a scene in the plane; expected no --view")
         options.chains = runs[0].dimension == 2 if options.chains is None else options.chains
-    if options.kind == "packing":
-        save(draw_packing(runs[0], options.step, options), out, options.dpi)
-    elif options.kind == "movie":
+    if options.kind == "movie":
         draw_movie(runs[0], options)
+        return
+    if options.kind == "packing":
+        figure = draw_packing(runs[0], options.step, options)
     elif options.kind == "history":
         columns = options.columns or (HISTORY if options.table == "history.csv" else "")
-        save(draw_history(runs, columns.split(",") if columns else None, options.against, options.mean, options.table), out)
+        figure = draw_history(runs, columns.split(",") if columns else None, options.against, options.mean, options.table)
     elif options.kind == "profile":
-        save(draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean), out)
+        figure = draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean)
     else:
-        save(draw_convergence(runs, options.step), out)
+        figure = draw_convergence(runs, options.step)
+    save_picture(figure, out, options.dpi if options.kind == "packing" else 200)
+    print(out)
 
 
 def main(arguments=None):
     options = parse(arguments)
-    plt.rcParams.update({"font.size": 9, "svg.hashsalt": "gravier"})
+    plt.rcParams.update(SETTINGS)
     check(options)
     try:
         draw(options)

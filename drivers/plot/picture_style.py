@@ -1,11 +1,15 @@
-"""What all pictures of matplotlib share: maps of colours, powers of ten, and the error of one line."""
+"""What all pictures of matplotlib share: maps of colours, powers of ten, fonts, files, and the error of one line."""
+import matplotlib.pyplot as plt
 import numpy
 from matplotlib.colors import BoundaryNorm, LinearSegmentedColormap, ListedColormap, to_rgb
 from palette import KINDS, SHADES
+from whole_file import save_figure
 
 SPEEDS = LinearSegmentedColormap.from_list("speeds", SHADES)
 TURNS = "PuOr"
 WALLS = "0.25"
+#: settings of matplotlib; the names of parts of an SVG are those of every run
+SETTINGS = {"font.size": 9, "svg.hashsalt": "gravier"}
 
 
 class PictureError(Exception):
@@ -24,3 +28,9 @@ def scaled(top, unit):
     """A power of ten that makes `top` a number from 1 to 1000, and the unit with it."""
     power = 3 * int(numpy.floor(numpy.log10(top) / 3.0))
     return power, f"$10^{{{power}}}$ {unit}" if power != 0 else unit
+
+
+def save_picture(figure, path, dpi=200):
+    """PNG or SVG, by the ending of the path, without what would tell when."""
+    save_figure(figure, path, dpi=dpi, bbox_inches="tight", metadata={"Software": None} if path.suffix == ".png" else {"Date": None})
+    plt.close(figure)

@@ -17,12 +17,13 @@ import numpy as np
 from oracle_table import Table
 from study_support import SOURCE, OneLineParser, claimed, plt, run, run_study, states, write_csv
 
+from gravier.force_networks import STRONG, tail_exponent, weak_exponent
 from whole_file import save_figure
 
 #: exponents of the publication
 BETA, ALPHA = 1.4, -0.3
-#: forces over their mean of which beta is fitted, and those of which the slope is shown; alpha is that of all forces below the mean
-STRONG, MIDDLE = (1.0, 5.0), (0.02, 0.5)
+#: forces over their mean of which the slope is shown; beta is fitted to those in STRONG, alpha to all forces below the mean
+MIDDLE = (0.02, 0.5)
 PRESSURE = 1000.0  # N/m
 STEP = 1.0e-3  # s
 #: from this step on the sample yields at a strain of a tenth and more, where its volume hardly changes
@@ -55,17 +56,8 @@ def compress(folder, compliant, steps):
 
 
 def exponents(forces):
-    """beta, alpha and the share of forces above the mean. beta is that of largest likelihood of an exponential between both ends of STRONG; alpha is
-    that of a power of the forces between nothing and the mean."""
-    low, high = STRONG
-    x = forces[(forces >= low) & (forces < high)] - low
-    trial = np.linspace(0.3, 5.0, 4701)
-    # mean of an exponential that is cut at the width
-    width = high - low
-    expected = 1.0 / trial - width / np.expm1(trial * width)
-    beta = trial[np.argmin(np.abs(expected - x.mean()))]
-    alpha = -1.0 / np.log(forces[(forces > 0.0) & (forces < 1.0)]).mean() - 1.0
-    return beta, alpha, np.mean(forces > 1.0)
+    """beta, alpha and the share of forces above the mean."""
+    return tail_exponent(forces, *STRONG), weak_exponent(forces), np.mean(forces > 1.0)
 
 
 def slope(forces):

@@ -401,6 +401,8 @@ contains
         call expect(report, tracked(i) == 0 .or. count(tracked == tracked(i)) == 1, "output", "tracked_bodies", error, &
                     "each identifier once")
       end do
+      call expect(report, any(tracked > 0) .or. .not. config%output%tracked_forces, "output", "tracked_forces", error, &
+                  ".false. without tracked_bodies, whose forces it adds")
     end associate
   end subroutine check_output
 

@@ -342,7 +342,9 @@ module gravier_config_table
      key_t("output", "walltime", kind_real, "0.0", ">= 0", &
            "wall time before which the run writes a checkpoint and stops; 0: it has no limit", unit="s"), &
      key_t("output", "tracked_bodies", kind_integer, "8*0", ">= 1", &
-           "identifiers of bodies whose places and velocities `history.csv` has in each step", count=8, note="none")]
+           "identifiers of bodies whose places and velocities `history.csv` has in each step", count=8, note="none"), &
+     key_t("output", "tracked_forces", kind_logical, ".false.", "", &
+           "write the force and the moment of all contacts on each of the `tracked_bodies`, too")]
 
   type(key_t), parameter :: region_keys(*) = &
     [key_t("region", "name", kind_text, "''", "letters, digits and underscores after a letter", &

@@ -194,6 +194,8 @@ module gravier_config_types
     logical :: vtk
     !> identifiers of the bodies that history.csv follows; 0: none
     integer :: tracked_bodies(8)
+    !> their forces are columns, too
+    logical :: tracked_forces
     !> which diagnostics are asked for, in the order of the registry
     logical, allocatable :: diagnostics(:)
   contains

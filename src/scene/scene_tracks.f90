@@ -24,6 +24,7 @@ contains
     if (n == 0) return
     allocate (tracked)
     allocate (tracked%id(n))
+    tracked%with_forces = config%output%tracked_forces
     n = 0
     do b = 1, size(config%output%tracked_bodies)
       if (config%output%tracked_bodies(b) == 0) cycle

@@ -173,6 +173,55 @@ class Jobs(RunTestCase):
         for text in logs():
             self.assertEqual(text.count("\nfinished "), 1, "a fresh run goes on from no checkpoint, in no row")
 
+    def test_a_table_of_results(self):
+        """The last values, or means, of columns of history.csv, a row a run: ended, under way with a row that is cut off, not begun, and of another case."""
+        keys = {"scene": {**CASE["scene"], "lattice_count": [6, 4], "friction": "@mu@"}, "time": {**CASE["time"], "steps": 12},
+                "output": {"directory": "results of/@run@", "every": 0}}
+        template = "! @name@\n! directory = 'elsewhere'\n" + namelist(keys).replace("'@mu@'", "@mu@")
+        write(os.path.join(self.work, "t.csv"), "mu, name\n0.1,a\n\n# none\n0.3, b\n0.5,c\n")
+        write(os.path.join(self.work, "t.nml"), template)
+        job = ("gravier_job", "--list", "t.csv")
+        table = (*job, "--table", "contacts,kinetic_energy")
+        done = self.sh(*table, "t.nml")
+        self.assertEqual((done.returncode, done.stdout), (0, "run,status,mu,name,step,contacts,kinetic_energy\n" + "".join(
+            f"t_{k},none,{mu},{name},,,\n" for k, mu, name in ((1, 0.1, "a"), (2, 0.3, "b"), (3, 0.5, "c")))), done.stderr)
+        self.assertFalse(os.path.exists(os.path.join(self.work, "t_1.nml")))
+        self.assertEqual(self.sh(*job, "t.nml").returncode, 0)
+        histories = [read_csv(os.path.join(self.work, "results of", f"t_{k}", "history.csv")) for k in (1, 2, 3)]
+        done = self.sh(*table, "t.nml")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = done.stdout.splitlines()
+        self.assertEqual(len(lines), 4)
+        for k, history in enumerate(histories):
+            cells = lines[k + 1].split(",")
+            self.assertEqual(cells[:5], [f"t_{k + 1}", "0", ["0.1", "0.3", "0.5"][k], "abc"[k], "12"])
+            self.assertEqual([float(cell) for cell in cells[5:]], [history["contacts"][-1], history["kinetic_energy"][-1]])
+        mean = self.sh(*table, "--mean", "5", "--row", "2", "t.nml").stdout.splitlines()
+        self.assertEqual(len(mean), 2)
+        for cell, name in zip(mean[1].split(",")[5:], ("contacts", "kinetic_energy")):
+            self.assertAlmostEqual(float(cell) / histories[1][name][-5:].mean(), 1.0, places=8)
+        # the second run goes on and is in the middle of a row; the third one is of another friction
+        os.remove(os.path.join(self.work, "t_2.done"))
+        path = os.path.join(self.work, "results of", "t_2", "history.csv")
+        with open(path, encoding="ascii") as file:
+            text = file.read()
+        write(path, text[:-2])
+        write(os.path.join(self.work, "t.csv"), "mu,name\n0.1,a\n0.3,b\n0.7,c\n")
+        lines = self.sh(*table, "t.nml").stdout.splitlines()
+        self.assertTrue(lines[2].startswith("t_2,unfinished,0.3,b,11,"), lines)
+        self.assertEqual(float(lines[2].split(",")[-1]), histories[1]["kinetic_energy"][-2])
+        self.assertEqual(lines[3], "t_3,changed,0.7,c,,,")
+        self.assertEqual(self.sh(*table, "--mean", "12", "t.nml").stdout.splitlines()[2], "t_2,unfinished,0.3,b,,,")
+        for arguments, words in (((*job, "--table", "contacts,weight", "t.nml"), "history.csv: no column weight; expected one of step,time,contacts"),
+                                 ((*table, "--mean", "13", "t.nml"), "t_1/history.csv: 12 steps; expected 13 at least"), ((*table, "--mean", "0", "t.nml"), "--mean 0: expected a number of steps"),
+                                 ((*job, "--mean", "3", "t.nml"), "--mean 3: expected --table COLUMNS too"), (("gravier_job", "--table", "a", "t.nml"), "--table a: expected --list LIST.csv too"),
+                                 ((*table, "--row", "9", "t.nml"), "no row 9")):
+            done = self.sh(*arguments)
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (2, "", 1), done.stderr)
+            self.assertIn(words, done.stderr)
+        done = self.sh(*table, "t.nml", GRAVIER_PROGRAM="gravier_sample")
+        self.assertIn("samples have no history.csv", done.stderr)
+
     def test_a_signal_to_the_job(self):
         """SIGTERM to the job stops the ranks, which write a checkpoint; the job ends after them, and no further row runs."""
         write(os.path.join(self.work, "long.nml"), namelist({**CASE, "time": {"step": 1e-3, "steps": 1000000}, "output": {"directory": "@run@", "every": 0}})

@@ -80,6 +80,7 @@ FILES = [
     key("output", "tracked_bodies", "77", "expected the identifiers of bodies of the scene"),
     key("output", "tracked_bodies", "1, 2, 1", "expected each identifier once"),
     key("output", "tracked_bodies", "1, -2", "expected at most 8 integers >= 1"),
+    key("output", "tracked_forces", ".true.", "expected .false. without tracked_bodies"),
     key("output", "final_forces", ".true.", "without final_bodies = .true."),
     # the type
     key("time", "step", "'fast'", "expected a finite real number > 0 (s)"),

@@ -337,9 +337,8 @@ class Run:
             body, contact, arm = self._arms(step, bodies, contacts)
             segments = np.stack([bodies.position[body], bodies.position[body] + arm], axis=1)
             return segments, contacts.impulse[contact, 0] / self.time_step()
-        reach = bodies.radius[row] + contacts.gap + np.where(other >= 0, bodies.radius[other], 0.0)
         start = bodies.position[row]
-        segments = np.stack([start, start - reach[:, None] * contacts.normal], axis=1)
+        segments = np.stack([start, start - self._branches(step, bodies, contacts)], axis=1)
         return segments, contacts.impulse[:, 0] / self.time_step()
 
     def pressure(self, step=None):
@@ -401,6 +400,16 @@ class Run:
             images = np.stack([arm, arm - edge, arm + edge])
             arm = images[np.argmin(np.linalg.norm(images, axis=2), axis=0), np.arange(len(arm))]
         return body, contact, arm
+
+    def _branches(self, step, bodies, contacts):
+        """The way from the centre of the antagonist's nearest image, or from a boundary, to that of the candidate, of each contact (n, d)."""
+        row, other = self._rows(bodies, contacts)
+        if "point" not in contacts:
+            return (bodies.radius[row] + contacts.gap + np.where(other >= 0, bodies.radius[other], 0.0))[:, None] * contacts.normal
+        _, _, arm = self._arms(step, bodies, contacts)
+        way = -arm[:len(contacts)]
+        way[other >= 0] += arm[len(contacts):]
+        return way
 
     def _edges(self, step):
         """The edges of the period, a row each. The last one of a cell that is sheared comes first: it leans along the edges before it, which

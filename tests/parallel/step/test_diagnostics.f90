@@ -388,7 +388,34 @@ contains
     call tracked%columns(list)
     call check_close(list%value(3), 1.0_dp, 0.0_dp, "it is found in another place")
     call sim%free()
+    call test_tracked_forces()
   end subroutine test_tracked_bodies
+
+  !> A disk between the floor and one above it has the difference of both forces, and its momentum changes by it.
+  subroutine test_tracked_forces()
+    type(simulation_t), target :: sim
+    real(dp) :: before, mass, largest
+    integer :: k, step
+
+    call make_scene(comm, case_text//" &output tracked_bodies = 2, 99, tracked_forces = T / &insertion name = 'more', "// &
+      & "radius = 0.1, rate = 1.0, lower = 0.1, 2, upper = 0.5, 3 /", sim)
+    call check_equal(sim%diagnostics%n_columns, 2*(2 + 2*sim%decomposition%nv), "columns of forces, too")
+    k = 3 + sim%decomposition%nv
+    call check_equal(trim(sim%diagnostics%name(k)), "body_fx:2", "the first of them")
+    mass = acos(-1.0_dp)*0.01_dp*sim%config%scene%density
+    before = 0.0_dp
+    largest = 0.0_dp
+    do step = 1, 9
+      call advance(sim)
+      call check_close(sim%diagnostics%value(k + 1), mass*((sim%diagnostics%value(4) - before)/0.01_dp - &
+        & sim%physics%gravity(2)), 1.0e-11_dp*mass, "its momentum changes by the force and its weight")
+      before = sim%diagnostics%value(4)
+      largest = max(largest, sim%diagnostics%value(k + 1))
+    end do
+    call check(largest > 0.1_dp*mass, "the floor holds it")
+    call check(ieee_is_nan(sim%diagnostics%value(sim%diagnostics%n_columns)), "a body that is not there has no force")
+    call sim%free()
+  end subroutine test_tracked_forces
 
 end program test_diagnostics
 

@@ -200,7 +200,7 @@ contains
       // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
       // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
-      // "  tracked_bodies = 17, 203" // newline &
+      // "  tracked_bodies = 17, 203, tracked_forces = .true." // newline &
       // "  energy = .true." // newline &
       // "  structure = .true., boundary_forces = .true., vtk = .true. /" // newline
   end function whole_file
@@ -240,6 +240,7 @@ contains
     call check_equal(config%output%checkpoint_every, 6, "checkpoint_every")
     call check_equal(config%output%fclib_step, 3, "fclib_step")
     call check(all(config%output%tracked_bodies(:3) == [17, 203, 0]), "tracked_bodies")
+    call check(config%output%tracked_forces, "tracked_forces")
     call check_close(config%output%checkpoint_seconds, 60.0_dp, 0.0_dp, "checkpoint_seconds")
     call check_close(config%output%walltime, 3600.0_dp, 0.0_dp, "walltime")
     call check(asks(config, "energy"), "energy")
@@ -346,6 +347,7 @@ contains
     call check_equal(config%output%checkpoint_every, 0, "default checkpoint_every")
     call check_equal(config%output%fclib_step, 0, "default fclib_step")
     call check(all(config%output%tracked_bodies == 0), "no tracked_bodies by default")
+    call check(.not. config%output%tracked_forces, "default tracked_forces")
     call check_close(config%output%checkpoint_seconds, 0.0_dp, 0.0_dp, "default checkpoint_seconds")
     call check_close(config%output%walltime, 0.0_dp, 0.0_dp, "default walltime")
     call check(.not. asks(config, "energy"), "default energy")
@@ -900,6 +902,8 @@ contains
       & "&output tracked_bodies = 1, -2: expected at most 8 integers >= 1")
     call refuse(column // "&output tracked_bodies = 1, 2, 1 /", &
       & "&output tracked_bodies = 1, 2, 1: expected each identifier once")
+    call refuse(column // "&output tracked_forces = .true. /", &
+      & "&output tracked_forces = .true.: expected .false. without tracked_bodies, whose forces it adds")
     call refuse(column // "&output fclib_step = -1 /", "&output fclib_step = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_seconds = -1 /", &
