@@ -124,7 +124,7 @@ class Scenes(unittest.TestCase):
             self.assertGreater(values["stress ratio"][0], 0.0)
             self.assertAlmostEqual(values["volume over that at the start"][0], 1.0, delta=0.01)
         settling = scenes.Settling(self.place, True, 1)
-        settling.count, settling.duration = (5, 5, 8), 0.15
+        settling.count, settling.duration = (5, 5, 8), 0.1
         settling.prepare()
         codes.run_lammps("lmp", settling.place / "lammps", settling.script())
         self.assertGreater(settling.of_lammps(settling.place / "lammps")["solid fraction"][0], 0.4)
