@@ -95,9 +95,7 @@ class Momentum(RunTestCase):
         `./gravier test long`."""
         cases = {f"column, {name}": merged(self.column, method) for name, method in METHODS.items() if name != "nscdd_ep"}
         for name, method in METHODS.items():
-            # plain iterations of the enriched methods, of which each is dear, are below the last goal after 1235 of them
-            fewer = {"solver": {"max_iterations": 2000}} if "enriched" in method else {}
-            cases[f"disks 0.3, {name}"] = merged(self.disks, method, fewer)
+            cases[f"disks 0.3, {name}"] = merged(self.disks, method)
         for friction in (0.0, 0.1, 0.5, 0.8, 1.2):
             cases[f"disks {friction}, nlgs"] = merged(self.disks, NLGS, {"scene": {"friction": friction}})
         for friction in (0.0, 0.3, 0.5, 0.8, 1.2) if LONG else (0.0, 0.3, 0.5):
