@@ -68,13 +68,16 @@ def solid_fraction(made, width, rng):
     offset = np.array([face @ points[0] for face, points in zip(normal, faces)])
     low, high = 2.0 * SIZE, 0.75 * np.quantile(bodies.position[:, 2], 0.95)
     place = np.column_stack([rng.random((POINTS, 2)) * box, low + (high - low) * rng.random(POINTS)])
+    # by height, so that each solid looks at the points of its own height alone
+    place = place[np.argsort(place[:, 2])]
     inside = np.zeros(POINTS, bool)
     for centre, radius, axes in zip(bodies.position, bodies.radius, axes_of(bodies.orientation)):
-        way = place - centre
+        first, last = np.searchsorted(place[:, 2], [centre[2] - radius, centre[2] + radius])
+        way = place[first:last] - centre
         way[:, :2] -= box * np.round(way[:, :2] / box)
         near = np.flatnonzero((way**2).sum(axis=1) < radius**2)
         within = np.all(way[near] @ axes @ normal.T <= offset * radius, axis=1)
-        inside[near[within]] = True
+        inside[first + near[within]] = True
     part = np.minimum(((place[:, 2] - low) / (high - low) * 4).astype(int), 3)
     parts = np.array([inside[part == k].mean() for k in range(4)])
     return inside.mean(), parts.std(ddof=1) / 2.0, (high - low) / SIZE

@@ -209,7 +209,7 @@ def prepare(kind, directory):
         write(os.path.join(directory, name), text.replace("'study'", "'disk/study'"))
         return "gravier_accuracy", [name]
     if kind == "columns":
-        return "gravier_columns", ["--count", "10", "--subdomains", "2", "--out", "disk/columns"]
+        return "gravier_columns", ["--count", "4", "--subdomains", "2", "--out", "disk/columns"]
     if kind == "bench":
         return "gravier_bench", ["--quick", "--rounds", "1", "--seconds", "0.001", "--contacts", "1000", "--spheres", "1000", "--iterations", "2",
                                  "--triad", "1000", "--csv", "disk/bench.csv"]

@@ -3,7 +3,7 @@ import itertools
 import os
 import re
 import subprocess
-import time
+import sys
 import unittest
 
 from gravier_runs import PROGRAMS, RunTestCase, alone_environment, gravier, merged, namelist, run_case, write
@@ -15,6 +15,13 @@ CASE = {"scene": {"bodies": "lattice", "friction": 0.3}, "time": {"step": 1e-3, 
         "solver": {"method": "nscdd", "max_iterations": 20}, "decomposition": {"subdomains": 4}, "output": {"directory": "results", "every": 0}}
 #: bytes that src/run/run_memory.f90 takes for a grain, by dimension and friction
 LEAST = {(2, 0.0): 520, (3, 0.0): 625, (2, 0.3): 635, (3, 0.3): 855}
+#: says the most memory [KiB] that a program has held, of which it is the only child: usage of a child of the test would have the memory of
+#: the test, and who looks at the program while it runs may miss its end
+PEAK = """import os, sys
+_, status, usage = os.wait4(os.posix_spawn(sys.argv[1], sys.argv[1:], os.environ), 0)
+print(usage.ru_maxrss, file=sys.stderr)
+sys.exit(os.waitstatus_to_exitcode(status))
+"""
 
 
 class Memory(RunTestCase):
@@ -59,18 +66,11 @@ class Memory(RunTestCase):
     def sample_peak(self, count, dimension, arrangement, radii):
         """[bytes] that gravier_sample held for so many grains."""
         self.write_sample(count, dimension, arrangement, radii)
-        held = 0
-        with alone_environment() as environment, \
-                subprocess.Popen([os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch, env=environment,
-                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL) as program:
-            # ru_maxrss would have the memory of this process, too, of which the program is a child
-            while program.poll() is None:
-                with open(f"/proc/{program.pid}/status", encoding="ascii") as status:
-                    peak = re.search(r"VmHWM:\s*(\d+) kB", status.read())
-                held = 1024 * int(peak[1]) if peak else held
-                time.sleep(0.005)
-        self.assertEqual(program.returncode, 0)
-        return held
+        with alone_environment() as environment:
+            run = subprocess.run([sys.executable, "-IS", "-c", PEAK, os.path.join(PROGRAMS, "gravier_sample"), "sample.nml"], cwd=self.scratch,
+                                 env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                                 check=True)
+        return 1024 * int(run.stderr)
 
     def sample_least(self, *kind):
         """[bytes] of a grain that gravier_sample refuses by."""

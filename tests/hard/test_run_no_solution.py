@@ -14,6 +14,8 @@ OTHERS = ["schwarz", "schwarz_ec", "nscdd_ep", "newton"]
 ENOUGH, LIMIT = 4000, 10000
 #: scenes whose first steps have a solution, and how many do at most: gaps close later, or what separates from a wall comes back
 LATER = {"gaps that close in the fifth step": 4, "restitution": 3}
+#: scenes that Schwarz-EC solves by the residual in `./gravier test long` alone: the 10000 iterations of one cost seconds, and it has four others
+DEAR = {"disks in a box, all sides close", "chain of 40"}
 RESIDUAL = {"solver": {"criterion": "residual", "max_iterations": LIMIT}}
 
 
@@ -68,7 +70,7 @@ class NoSolution(RunTestCase):
         ones. It must not end a solve there."""
         # NSCDD in every fourth scene and on two ranks, the others on one: the criterion is the same in all methods
         jobs = [(name, method, ranks if LONG or method == "nscdd" else 1, RESIDUAL, "residual") for name, method, ranks in taking_turns()
-                if LONG or method != "nscdd" or ranks == 2]
+                if LONG or (method != "nscdd" or ranks == 2) and not (method == "schwarz_ec" and name in DEAR)]
         for (name, method, ranks, *_), run in zip(jobs, each(self.play, jobs)):
             with self.subTest(name, method=method, ranks=ranks):
                 self.assert_refused(run, name, LIMIT + 1)

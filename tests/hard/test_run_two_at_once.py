@@ -68,7 +68,13 @@ class TwoAtOnce(RunTestCase):
         run.wait_for_rows(2)
         return run
 
-    def test_a_second_run_is_refused(self):
+    def test_places_that_are_taken(self):
+        """Each program waits some seconds for its place and takes no processor meanwhile, so that all of them wait at once."""
+        checks = (self.second_run, self.ranks_that_outlive_their_launcher, self.lock_that_a_crash_has_left, self.lock_without_a_name,
+                  self.other_programs)
+        each(lambda check: check(), [(check,) for check in checks], workers=len(checks))
+
+    def second_run(self):
         """Begun anew or as a restart, on one and on two ranks, and under another spelling of the directory."""
         run = self.going("second")
         results = os.path.join(run.directory, "results")
@@ -91,6 +97,80 @@ class TwoAtOnce(RunTestCase):
         self.assertEqual(status, 4, said)
         self.assertIn("interrupted *** by SIGTERM", said)
         self.assertNotIn(".gravier.lock", os.listdir(results))
+
+    def ranks_that_outlive_their_launcher(self):
+        """A rank that is left holds the second byte of the lock: a run waits while it goes, and is refused where it stays."""
+        directory = self.here("outlived")
+        path = os.path.join(directory, "results", ".gravier.lock")
+        os.makedirs(os.path.dirname(path))
+        rank = subprocess.Popen([sys.executable, "-c", "import fcntl, sys, time\nfile = open(sys.argv[1], 'w+')\n"
+                                 "file.write('elsewhere\\ngravier case.nml, process 77\\n')\nfile.flush()\n"
+                                 "fcntl.lockf(file, fcntl.LOCK_SH, 1, 1)\nprint('held', flush=True)\n"
+                                 "sys.stdin.readline()\ntime.sleep(1.5)\n", path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.addCleanup(rank.communicate)
+        self.assertEqual(rank.stdout.readline(), "held\n")
+        self.assert_refused(run_case(CASE, 1, directory))
+        self.assertEqual(os.listdir(os.path.dirname(path)), [".gravier.lock"])
+        rank.stdin.write("\n")
+        rank.stdin.flush()
+        self.assert_status(run_case(CASE, 2, directory), 0)
+
+    def lock_that_a_crash_has_left(self):
+        """A lock file that nobody holds is no obstacle; one that another machine holds is named with the line that clears it."""
+        directory = self.here("it's left")
+        path = os.path.join(directory, "results", ".gravier.lock")
+        os.makedirs(os.path.dirname(path))
+        write(path, "elsewhere\ngravier case.nml, process 77\n")
+        self.assert_status(run_case(CASE, 2, directory), 0)
+        self.assertFalse(os.path.exists(path))
+        write(path, "elsewhere\ngravier case.nml, process 77\n")
+        with open(path, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX)
+            refused = run_case(merged(CASE, {"output": {"directory": os.path.dirname(path)}}), 1, directory)
+            self.assert_status(refused, 2)
+            self.assertIn("gravier case.nml, process 77 on elsewhere; if that one is no more, this clears its lock: rm ", refused.stderr)
+            line = refused.stderr.split("clears its lock: ")[1].split("; expected")[0]
+            subprocess.run(line, shell=True, check=True)
+            self.assert_status(run_case(CASE, 2, directory), 0)
+
+    def lock_without_a_name(self):
+        """A lock file that is held and is empty."""
+        directory = self.here("nameless")
+        path = os.path.join(directory, "results", ".gravier.lock")
+        os.makedirs(os.path.dirname(path))
+        write(path, "")
+        with open(path, "rb+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX)
+            self.assertIn("another program writes here, results/.gravier.lock is locked", run_case(CASE, 1, directory).stderr)
+
+    def other_programs(self):
+        """Of two samples in one file, of two studies and of two sets of FCLIB problems in one directory one is refused; samples in
+        different files are made side by side."""
+        directory = self.here("others")
+        os.makedirs(directory)
+        fault_trials.write_sample(directory, "sample.nml", "grains.h5", 50)
+        fault_trials.write_sample(directory, "other.nml", "other.h5", 50)
+        problem = fault_trials.write_fclib(directory)
+        taken = ((".grains.h5.lock", "gravier_sample", ["sample.nml"]), ("out/.gravier.lock", "gravier_fclib", ["--write", "out", problem]),
+                 (".table.csv.lock", "gravier_fclib", ["--csv", "table.csv", problem]),
+                 (".profile.csv.lock", "gravier_fclib", ["--profile", "profile.csv", problem]),
+                 ("columns/.gravier.lock", "gravier_columns", ["--count", "4", "--subdomains", "2"]),
+                 (".error.csv.lock", "gravier_error", [fault_trials.write_error_case(directory)]),
+                 ("study/.gravier.lock", "gravier_accuracy", [fault_trials.write_study(directory)]),
+                 (".bench.csv.lock", "gravier_bench", ["--csv", "bench.csv"]))
+        with contextlib.ExitStack() as held:
+            for lock, _, _ in taken:
+                path = os.path.join(directory, lock)
+                os.makedirs(os.path.dirname(path), exist_ok=True)
+                fcntl.lockf(held.enter_context(open(path, "wb+")), fcntl.LOCK_EX)
+            before = {folder: names for folder, _, names in os.walk(directory)}
+            # each waits some seconds
+            runs = each(lambda _, program, arguments: gravier(*arguments, program=program, directory=directory), taken, workers=len(taken))
+            for run in runs:
+                self.assert_refused(run, "another program writes here, ")
+            self.assertEqual({folder: sorted(names) for folder, _, names in os.walk(directory)},
+                             {folder: sorted(names) for folder, names in before.items()})
+            self.assert_status(gravier("other.nml", program="gravier_sample", directory=directory), 0)
 
     def test_runs_of_their_own(self):
         """Runs in places of their own that begin and end beside each other, without a launcher: none of them says or loses anything,
@@ -136,45 +216,6 @@ class TwoAtOnce(RunTestCase):
         self.assert_status(run_case(CASE, 1, directory), 0)
         self.assertEqual(sorted(os.listdir(os.path.join(directory, "results"))), own)
 
-    def test_ranks_that_outlive_their_launcher(self):
-        """A rank that is left holds the second byte of the lock: a run waits while it goes, and is refused where it stays."""
-        directory = self.here("outlived")
-        path = os.path.join(directory, "results", ".gravier.lock")
-        os.makedirs(os.path.dirname(path))
-        rank = subprocess.Popen([sys.executable, "-c", "import fcntl, sys, time\nfile = open(sys.argv[1], 'w+')\n"
-                                 "file.write('elsewhere\\ngravier case.nml, process 77\\n')\nfile.flush()\n"
-                                 "fcntl.lockf(file, fcntl.LOCK_SH, 1, 1)\nprint('held', flush=True)\n"
-                                 "sys.stdin.readline()\ntime.sleep(1.5)\n", path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-        self.addCleanup(rank.communicate)
-        self.assertEqual(rank.stdout.readline(), "held\n")
-        self.assert_refused(run_case(CASE, 1, directory))
-        self.assertEqual(os.listdir(os.path.dirname(path)), [".gravier.lock"])
-        rank.stdin.write("\n")
-        rank.stdin.flush()
-        self.assert_status(run_case(CASE, 2, directory), 0)
-
-    def test_a_lock_that_a_crash_has_left(self):
-        """A lock file that nobody holds is no obstacle; one that another machine holds is named with the line that clears it."""
-        directory = self.here("it's left")
-        path = os.path.join(directory, "results", ".gravier.lock")
-        os.makedirs(os.path.dirname(path))
-        write(path, "elsewhere\ngravier case.nml, process 77\n")
-        self.assert_status(run_case(CASE, 2, directory), 0)
-        self.assertFalse(os.path.exists(path))
-        write(path, "elsewhere\ngravier case.nml, process 77\n")
-        with open(path, "rb+") as file:
-            fcntl.lockf(file, fcntl.LOCK_EX)
-            refused = run_case(merged(CASE, {"output": {"directory": os.path.dirname(path)}}), 1, directory)
-            self.assert_status(refused, 2)
-            self.assertIn("gravier case.nml, process 77 on elsewhere; if that one is no more, this clears its lock: rm ", refused.stderr)
-            line = refused.stderr.split("clears its lock: ")[1].split("; expected")[0]
-            subprocess.run(line, shell=True, check=True)
-            self.assert_status(run_case(CASE, 2, directory), 0)
-            write(path, "")
-        with open(path, "rb+") as file:
-            fcntl.lockf(file, fcntl.LOCK_EX)
-            self.assertIn("another program writes here, results/.gravier.lock is locked", run_case(CASE, 1, directory).stderr)
-
     def test_no_locks(self):
         """A lock file that cannot be one is an error; a file system without locks is warned of."""
         directory = self.here("no locks")
@@ -211,35 +252,6 @@ class TwoAtOnce(RunTestCase):
                 self.assertNotIn("interrupted ***", said)
                 self.assertNotIn("finished ", said)
 
-    def test_other_programs(self):
-        """Of two samples in one file, of two studies and of two sets of FCLIB problems in one directory one is refused; samples in
-        different files are made side by side."""
-        directory = self.here("others")
-        os.makedirs(directory)
-        fault_trials.write_sample(directory, "sample.nml", "grains.h5", 50)
-        fault_trials.write_sample(directory, "other.nml", "other.h5", 50)
-        problem = fault_trials.write_fclib(directory)
-        taken = ((".grains.h5.lock", "gravier_sample", ["sample.nml"]), ("out/.gravier.lock", "gravier_fclib", ["--write", "out", problem]),
-                 (".table.csv.lock", "gravier_fclib", ["--csv", "table.csv", problem]),
-                 (".profile.csv.lock", "gravier_fclib", ["--profile", "profile.csv", problem]),
-                 ("columns/.gravier.lock", "gravier_columns", ["--count", "4", "--subdomains", "2"]),
-                 (".error.csv.lock", "gravier_error", [fault_trials.write_error_case(directory)]),
-                 ("study/.gravier.lock", "gravier_accuracy", [fault_trials.write_study(directory)]),
-                 (".bench.csv.lock", "gravier_bench", ["--csv", "bench.csv"]))
-        with contextlib.ExitStack() as held:
-            for lock, _, _ in taken:
-                path = os.path.join(directory, lock)
-                os.makedirs(os.path.dirname(path), exist_ok=True)
-                fcntl.lockf(held.enter_context(open(path, "wb+")), fcntl.LOCK_EX)
-            before = {folder: names for folder, _, names in os.walk(directory)}
-            # each waits some seconds
-            runs = each(lambda _, program, arguments: gravier(*arguments, program=program, directory=directory), taken, workers=len(taken))
-            for run, (lock, program, _) in zip(runs, taken):
-                with self.subTest(program=program, lock=lock):
-                    self.assert_refused(run, "another program writes here, ")
-            self.assertEqual({folder: sorted(names) for folder, _, names in os.walk(directory)},
-                             {folder: sorted(names) for folder, names in before.items()})
-            self.assert_status(gravier("other.nml", program="gravier_sample", directory=directory), 0)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 Blocks of a page are run down the page in one directory that holds links to data/ and drivers/, with the programs on PATH:
 - a block sh or python whose first line is `# tested` must end with status 0; any other one has a line
   `<!-- not run: REASON -->` above it, and the test lists them;
+- a tested block with the line `<!-- in the long tests -->` above it runs in `./gravier test long` alone, and is parsed in the suite;
 - a block fortran that is a complete case (it has &scene and &time) must pass `gravier --check`; a first line
   `! NAME.nml` leaves it under that name for the blocks after it.
 """
@@ -21,6 +22,8 @@ import forked_scripts
 import h5py
 import matplotlib.pyplot  # noqa: F401
 
+from gravier_runs import ALONE, ENVIRONMENT, LONG, PATIENCE
+
 SOURCE = Path(os.environ.get("GRAVIER_SOURCE_DIR", Path(__file__).resolve().parents[2])).resolve()
 PROGRAMS = Path(os.environ.get("GRAVIER_BIN_DIR", SOURCE / "build/release/bin")).resolve()
 MPIEXEC = shutil.which(os.environ.get("MPIEXEC", "mpiexec")) or "mpiexec"
@@ -29,17 +32,6 @@ PAGES = [SOURCE / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.m
 BANNED = ["TODO", "FIXME", "XXX", "coming soon", "not yet implemented"]
 # pages whose blocks need no line to say why they are not run
 UNMARKED = {"README.md": "builds the program, or installs packages"}
-PATIENCE = 900  # seconds for one block
-
-ENVIRONMENT = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe", "OMPI_MCA_hwloc_base_binding_policy": "none",
-    "OMPI_MCA_mpi_yield_when_idle": "1", "OMPI_MCA_btl_vader_single_copy_mechanism": "none", "OPENBLAS_NUM_THREADS": "1",
-    "OMP_NUM_THREADS": "1",
-}
-#: of programs without a launcher, as in gravier_runs: Open MPI starts no daemon for them
-ALONE = {"OMPI_MCA_ess_singleton_isolated": "1", "OMPI_MCA_btl": "self", "OMPI_MCA_pml": "ob1", "OMPI_MCA_coll": "basic,libnbc,self",
-         "OMPI_MCA_mpi_yield_when_idle": "0"}
 
 
 class Block:
@@ -47,8 +39,8 @@ class Block:
 
     def __init__(self, page, line, language):
         self.page, self.line, self.language, self.lines = page, line, language, []
-        #: why it is not run
-        self.reason = None
+        #: why it is not run, and whether it is only where LONG is true
+        self.reason, self.long = None, False
 
     @property
     def text(self):
@@ -73,19 +65,20 @@ class Block:
 def read(page):
     """Blocks of a page, and its text without them (their lines left empty)."""
     blocks, prose, block = [], [], None
-    reason = None
+    before = ""
     for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
         fence = re.match(r"\s*```(\w*)\s*$", line)
         if fence and block is None:
             block = Block(page, number, fence[1])
-            block.reason = reason
+            reason = re.match(r"\s*<!-- not run: (.+) -->$", before)
+            block.reason, block.long = reason[1] if reason else None, before.strip() == "<!-- in the long tests -->"
         elif fence:
             blocks.append(block)
             block = None
         elif block is not None:
             block.lines.append(line)
         prose.append("" if fence or block is not None else line)
-        reason = re.match(r"\s*<!-- not run: (.+) -->$", line)
+        before = line
     if block is not None:
         raise AssertionError(f"{block.place}: this block is not closed")
     return blocks, "\n".join(prose)
@@ -341,6 +334,9 @@ class Blocks(unittest.TestCase):
             if block.is_case():
                 (self.work / block.case_name()).write_text(block.text, encoding="utf-8")
                 command = [str(PROGRAMS / "gravier"), "--check", block.case_name()]
+            elif block.is_tested() and block.long and not LONG:
+                self.assert_parses(block)
+                continue
             elif block.is_tested():
                 script = self.directory / f"line{block.line}"
                 script.write_text(block.text, encoding="utf-8")
@@ -357,6 +353,13 @@ class Blocks(unittest.TestCase):
                 self.fail(f"{block.place}: {how}:\n{block.text}\n{output[-3000:]}")
         return count
 
+    def assert_parses(self, block):
+        if block.language == "python":
+            compile(block.text, block.place, "exec")
+        else:
+            status, output = run(["sh", "-n", "-c", block.text], ".")
+            self.assertEqual(status, 0, f"{block.place}: {output}")
+
     def test_blocks_that_are_not_run_say_why(self):
         """They are few, parse, and name files that exist."""
         left_out = []
@@ -364,12 +367,10 @@ class Blocks(unittest.TestCase):
             for block in read(page)[0]:
                 if block.language not in ("sh", "python") or block.is_tested():
                     continue
-                reason = block.reason[1] if block.reason else UNMARKED.get(page.name)
+                reason = block.reason or UNMARKED.get(page.name)
                 self.assertTrue(reason, f"{block.place}: expected `# tested` as its first line, or <!-- not run: REASON --> above it")
                 left_out.append(f"{block.place}: {reason}")
-                if block.language == "sh":
-                    status, output = run(["sh", "-n", "-c", block.text], ".")
-                    self.assertEqual(status, 0, f"{block.place}: {output}")
+                self.assert_parses(block)
                 for path in re.findall(r"(?<![\w/.])(?:data|doc|drivers|tests)/[\w./]+\w", block.text):
                     self.assertTrue((SOURCE / path).exists(), f"{block.place}: {path}: no such file")
         print("blocks that are not run:", *left_out, sep="\n  ")

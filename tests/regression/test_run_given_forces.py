@@ -228,7 +228,7 @@ class GivenForces(RunTestCase):
         cases = {
             "rolling": {"scene": {"rolling_friction": 0.05}, "sample": few},
             "spheres": {"scene": {"dimension": 3, "rolling_friction": 0.05, "pivoting_friction": 0.05},
-                        "sample": {"count": 60, "box": [0.06, 0.06], "solid_fraction": 0.25}},
+                        "sample": {"count": 30, "box": [0.045, 0.045], "solid_fraction": 0.25}},
             "periodic": {"scene": {"period": [0.15, 0.0]}, "sample": {**few, "box": None}},
             "adhesive": {"material": [{"name": "wet"}], "law": [{"materials": ["wet", "wet"], "kind": "adhesive", "adhesion": 0.5, "adhesion_range": 1e-4, "friction": 0.3}],
                          "scene": {"friction": None}, "sample": few},

@@ -114,6 +114,18 @@ def gravier(*arguments, ranks=1, directory=".", program="gravier"):
     return Run(directory, status, stdout.decode(errors="replace"), stderr.decode(errors="replace"), "")
 
 
+def quick_launcher(directory):
+    """A launcher, for MPIEXEC, that starts programs on one rank by themselves, in a sixth of the time, as scripts that ask for one rank get it."""
+    alone = " ".join(f"{name}={value}" for name, value in {**ALONE, "OMPI_MCA_orte_tmpdir_base": f'"{directory}"'}.items())
+    path = write(os.path.join(directory, "launcher"), f"""#!/bin/sh
+[ "$1 $2" = "-n 1" ] || exec "{MPIEXEC}" "$@"
+shift 2
+exec env {alone} "$@"
+""")
+    os.chmod(path, 0o755)
+    return path
+
+
 def wait_for_end(process, command, ranks):
     """What a run leaves on its two outputs."""
     try:

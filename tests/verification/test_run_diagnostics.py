@@ -143,7 +143,7 @@ class Diagnostics(RunTestCase):
                 b.update({"shape": "outlet", "velocity": None})
         boundaries = [{key: value for key, value in b.items() if value is not None} for b in boundaries if b["name"] != "stirrer"]
         boundaries[1]["remove_at"] = 0.06
-        run = self.run_here("leave", merged(case, ALL), boundaries, 2)
+        run = self.run_here("leave", merged(case, ALL), boundaries)
         history = run.history()
         self.check_balance(history)
         self.assertGreater(history["carried_away"][-1], 0.1 * self.exchanged(history))

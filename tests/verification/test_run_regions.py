@@ -332,9 +332,9 @@ class Regions(RunTestCase):
                     found = self.region(runs[0], name, state)
                     self.assertEqual(list(found.samples), [len(taken)] * len(found.samples))
                     self.compare_samples(found, [self.region(each, name, step) for step in taken])
-                    for other in runs[1:]:
+                    for other in (self.region(run, name, state) for run in runs[1:]):
                         for key, values in found.items():
-                            np.testing.assert_array_equal(self.region(other, name, state)[key], values, f"{name} {state} {key}")
+                            np.testing.assert_array_equal(other[key], values, f"{name} {state} {key}")
 
     def killed(self, title, case):
         """A run that is killed after step 15; its directory."""

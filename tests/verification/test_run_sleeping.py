@@ -351,12 +351,14 @@ class Sleeping(RunTestCase):
         shares = []
         for run in runs:
             self.assert_status(run, 0)
-            self.assertEqual(run.history()["converged"].min(), 1)
+            history = run.history()
+            self.assertEqual(history["converged"].min(), 1)
             # where nothing sleeps the second method is tried as ever
             taken = re.search(r"took over (\d+) solve", run.stdout)
-            held = run.history()["iterations"] * ((run.history()["woken"] > 0) & (run.history()["iterations"] > 900))
+            iterations = history["iterations"]
+            held = iterations * ((history["woken"] > 0) & (iterations > 900))
             self.assertLess(int(taken[1]) if taken else 0, 0.2 * np.count_nonzero(held))
-            shares.append([held[k:k + 50].sum() / (1 + run.history()["iterations"][k:k + 50].sum()) for k in range(0, 950, 10)])
+            shares.append([held[k:k + 50].sum() / (1 + iterations[k:k + 50].sum()) for k in range(0, 950, 10)])
         seed, begin = np.unravel_index(np.argmax(shares), np.shape(shares))
         part = [merged(cases[seed], {"time": {"steps": 10 * int(begin) + more}, "output": {"checkpoint_every": 10}}) for more in (0, 50)]
         self.assert_status(run_case(part[0], 1, self.here("part")), 0)
