@@ -4,6 +4,7 @@ module gravier_scale_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
   use gravier_time_table, only: time_table_t
+  use gravier_cell_drive, only: cell_components
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
   implicit none
@@ -34,6 +35,9 @@ module gravier_scale_report
   real(dp), parameter :: most_of_period = 0.1_dp
   !> part of the ups and downs of a table that steps should keep
   real(dp), parameter :: least_kept = 0.9_dp
+  !> answer times of a cell between two turns of a stress that it holds: measured, where a shear to and fro has the strain of a
+  !> light cell to a tenth
+  real(dp), parameter :: least_answers = 15.0_dp
 
 contains
 
@@ -61,6 +65,9 @@ contains
         if (scales%pressure > 0.0_dp) text = text//"; inertial number I = "//figure(scales%inertial_number())
         text = text//newline
       end if
+      if (any(simulation%cell_drive%driven)) text = text//"            the cell answers to stresses of "// &
+        & figure(largest_stress(simulation))//pressure_unit(simulation)//" after about "//figure(answer_time(simulation))// &
+        & " s (cell_inertia = "//figure(simulation%cell_drive%inertia)//")"//newline
       if (scales%speed > 0.0_dp) text = text//"            fastest boundary '"//boundaries(scales%fastest)%name//"': "// &
         & figure(scales%speed)//" m/s, "//figure(2.0_dp*scales%speed*h/scales%diameter)//" mean radii a step"//newline
     end associate
@@ -189,7 +196,7 @@ contains
     end associate
   end function slip_warning
 
-  !> That a cell is so light that it answers to a change of impulses by more than the contacts themselves; else empty.
+  !> That a cell is so light that it answers to a change of impulses by more than the contacts themselves, or too heavy; else empty.
   function cell_warning(simulation, diameter) result(text)
     type(simulation_t), intent(in) :: simulation
     !> of the mean grain [m]
@@ -206,10 +213,71 @@ contains
         if (any(drive%driven(:, k))) shortest = min(shortest, length(k))
       end do
       least = (diameter/shortest)**2
+      text = answer_warning(simulation)
       if (drive%inertia < least) text = "&scene cell_inertia = "//figure(drive%inertia)//": so light a cell moves too far in "// &
         & "an iteration for solves to end; at least (d/L)^2 = "//figure(least)//" would do"
     end associate
   end function cell_warning
+
+  !> The largest stress that a cell is to hold, at any time; 0 where it holds none [Pa, N/m in 2D].
+  real(dp) function largest_stress(simulation) result(most)
+    type(simulation_t), intent(in) :: simulation
+    integer :: k, n
+
+    most = 0.0_dp
+    associate (drive => simulation%cell_drive)
+      if (any(drive%driven)) most = maxval(abs(drive%stress), mask=drive%driven)
+      if (.not. allocated(drive%table%has)) return
+      n = cell_components(simulation%decomposition%nd)
+      do k = n + 1, 2*n
+        if (drive%table%has(k)) most = max(most, maxval(abs(drive%table%value(k, :))))
+      end do
+    end associate
+  end function largest_stress
+
+  !> Time in which the largest of the stresses held gives the slowest component of the cell a rate of one over this time; 0 of a
+  !> cell that no stress drives [s].
+  real(dp) function answer_time(simulation) result(time)
+    type(simulation_t), intent(in) :: simulation
+    real(dp) :: longest, volume, most
+    integer :: k
+
+    time = 0.0_dp
+    most = largest_stress(simulation)
+    associate (drive => simulation%cell_drive, length => simulation%decomposition%period%length, nd => simulation%decomposition%nd)
+      if (.not. (any(drive%driven) .and. most > 0.0_dp)) return
+      longest = 0.0_dp
+      volume = 1.0_dp
+      do k = 1, nd
+        if (any(drive%driven(:, k))) longest = max(longest, length(k))
+        volume = volume*length(k)
+      end do
+      time = longest*sqrt(drive%inertia*simulation%mass/(volume*most))
+    end associate
+  end function answer_time
+
+  !> That a stress of the cell turns before the cell has answered to it; else empty.
+  function answer_warning(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    real(dp) :: turn, answers
+    integer :: k, n
+
+    text = ""
+    associate (drive => simulation%cell_drive)
+      if (.not. (any(drive%driven) .and. allocated(drive%table%has))) return
+      n = cell_components(simulation%decomposition%nd)
+      turn = huge(turn)
+      do k = n + 1, 2*n
+        if (drive%table%has(k)) turn = min(turn, drive%table%shortest_way(k))
+      end do
+      answers = turn/answer_time(simulation)
+      if (.not. answers < least_answers) return
+      text = "&scene cell_inertia = "//figure(drive%inertia)//": a stress of cell_table turns after "//figure(turn)//" s, "// &
+        & figure(answers)//" of the times in which the cell answers, so that contacts bear other stresses than those held and "// &
+        & "strains may be wrong; at most "//figure(drive%inertia*(answers/least_answers)**2)//" would do"
+    end associate
+  end function answer_warning
 
   !> That steps pass over the ups and downs of a table, the one of which they keep the least part; else empty.
   function table_warning(simulation) result(text)

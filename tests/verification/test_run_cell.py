@@ -257,6 +257,27 @@ class Cell(CellTestCase):
             self.assertEqual(len(re.findall(r"^warning     &scene cell_inertia = 1\.00E-02: so light a cell .* at least \(d/L\)\^2 = 1\.7\dE-02 "
                                             "would do$", run.stdout, re.M)), expected, run.stdout)
 
+    def test_slow_cell(self):
+        """A cell that answers to its stresses later than they turn is warned of, with the inertia that would do; one that is as light, one whose stress
+        does not turn, and one with a given rate are not. The answer time goes with the root of the inertia."""
+        here = self.here("slow")
+        os.makedirs(here)
+        times = []
+        for name, scene, column, expected in (("slow", {}, "shear_stress_xy", 1), ("light", {"cell_inertia": 1e-3}, "shear_stress_xy", 0),
+                                              ("once", {}, "shear_stress_xy", 0), ("rate", {}, "shear_rate_xy", 0)):
+            last = "2,0.1" if name == "once" else "2,0.1\n6,-0.1\n8,0"
+            table = write(f"{here}/{name}.csv", f"time,{column}\n0,0\n{last}\n")
+            scene = {"cell_shear_rate": [0.0], "cell_inertia": 1.0, "cell_table": table, **scene}
+            run = run_case(merged(LATTICE, {"scene": scene}), directory=self.here(f"slow {name}"), options=["--check"])
+            self.assert_status(run, 0)
+            found = re.findall(r"^warning     &scene cell_inertia = (\S+): a stress of cell_table turns after 4\.00E\+00 s, (\S+) of the times in which the "
+                               r"cell answers, .*; at most (\S+) would do$", run.stdout, re.M)
+            self.assertEqual(len(found), expected, run.stdout)
+            for inertia, answers, most in np.array(found, float):
+                self.assertAlmostEqual(most / (inertia * (answers / 15.0)**2), 1.0, delta=0.02)
+            times.append(float(re.search(r"^ +the cell answers to stresses of 1\.00E\+00 N/m after about (\S+) s", run.stdout, re.M)[1]))
+        self.assertAlmostEqual(times[1] / times[0], np.sqrt(1e-3), delta=3e-4)
+
     def test_refused(self):
         """What does not go with a cell that moves is refused by one line."""
         here = self.here("refused")

@@ -25,6 +25,7 @@ module gravier_time_table
     procedure :: at => time_table_at
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
+    procedure :: shortest_way => time_table_shortest_way
     procedure :: digest => time_table_digest
   end type time_table_t
 
@@ -271,5 +272,34 @@ contains
     end do
     digest = hash_words(words)
   end function time_table_digest
+
+  !> Shortest time between two turns of a quantity, from a highest value to a lowest or back; huge where there are fewer than two.
+  !> In a table that begins anew its first turn follows its last one [s].
+  pure real(dp) function time_table_shortest_way(self, column) result(shortest)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: column
+    real(dp) :: last, first, change
+    integer :: row, rows, turns, before
+
+    shortest = huge(shortest)
+    rows = size(self%time)
+    turns = 0
+    before = 0
+    last = 0.0_dp
+    first = 0.0_dp
+    do row = 2, rows
+      change = self%value(column, row) - self%value(column, row - 1)
+      if (.not. abs(change) > 0.0_dp) cycle
+      if (before /= 0 .and. before /= merge(1, -1, change > 0.0_dp)) then
+        turns = turns + 1
+        if (turns == 1) first = self%time(row - 1)
+        if (turns > 1) shortest = min(shortest, self%time(row - 1) - last)
+        last = self%time(row - 1)
+      end if
+      before = merge(1, -1, change > 0.0_dp)
+    end do
+    if (self%period > 0.0_dp .and. turns > 1) shortest = min(shortest, first + self%period - last)
+    if (self%period > 0.0_dp .and. turns == 1) shortest = min(shortest, last - self%time(1), self%time(rows) - last)
+  end function time_table_shortest_way
 
 end module gravier_time_table

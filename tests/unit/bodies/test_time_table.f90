@@ -14,6 +14,7 @@ program test_time_table
   call test_repeating()
   call test_one_row()
   call test_variation()
+  call test_turns()
   call test_many_rows()
   call test_refusals()
   call finish_checks()
@@ -123,6 +124,38 @@ contains
     call check_close(table%kept_variation(0.5_dp, 8), 1.0_dp, 1.0e-12_dp, "a jump between two steps is kept")
     call check_close(table%kept_variation(0.5_dp, 40), 1.0_dp/3.0_dp, 1.0e-12_dp, "a dip between two steps is not")
   end subroutine test_variation
+
+  !> Times between turns: a square wave with flats, one turn alone, a cycle that begins anew, with one turn or three in it.
+  subroutine test_turns()
+    call expect_turns("0,0 1,2 3,2 4,0 4.5,0 9,7", .false., 1.5_dp, "from the end of a flat to that of the next")
+    call expect_turns("0,0 1,2 3,0", .false., huge(1.0_dp), "one turn")
+    call expect_turns("0,0 1,2 3,2", .false., huge(1.0_dp), "none")
+    call expect_turns("0,0 1,2 5,0", .true., 1.0_dp, "one turn of a cycle, and that at its ends")
+    call expect_turns("0,0 2,1 8,-1 9,0", .true., 3.0_dp, "a turn of the next cycle")
+  end subroutine test_turns
+
+  !> The shortest time between turns of a table whose rows have a blank between two.
+  subroutine expect_turns(rows, repeats, time, name)
+    character(len=*), intent(in) :: rows, name
+    logical, intent(in) :: repeats
+    real(dp), intent(in) :: time
+    type(error_t), allocatable :: error
+    character(len=:), allocatable :: text
+    integer :: k
+
+    text = "time,vx"//newline
+    do k = 1, len(rows)
+      if (rows(k:k) == " ") then
+        text = text//newline
+      else
+        text = text//rows(k:k)
+      end if
+    end do
+    call read_table(text//newline, error, repeats)
+    call check(.not. allocated(error), name)
+    if (allocated(error)) return
+    call check_close(table%shortest_way(1), time, 1.0e-12_dp*time, name)
+  end subroutine expect_turns
 
   !> More rows than there is room for at first: a square of the time, exact at rows, off by 1/4 between them.
   subroutine test_many_rows()
