@@ -203,7 +203,7 @@ contains
     !> (n_phases), mean over the ranks, and of the run [s]
     real(dp), intent(in) :: phases(n_phases), seconds
     character(len=:), allocatable :: text
-    real(dp) :: iterations(3), looser_seconds(3)
+    real(dp) :: iterations(3), looser_seconds(3), slowest, subdomains
     integer :: k
 
     text = ""
@@ -212,11 +212,14 @@ contains
     do k = 1, size(iterations)
       looser_seconds(k) = comm%highest(simulation%effort%seconds_of(iterations(k)))
     end do
+    slowest = 1.0_dp
+    if (simulation%decomposition%n_subdomains > 1) &
+      & call simulation%method%measure_balance(comm, simulation%decomposition%n_subdomains, slowest, subdomains)
     if (simulation%effort%solves == 0) return
     text = "converged   "//converged_text(simulation)//newline
     if (simulation%failed > 0 .or. simulation%spot_checks%refute()) text = text//"to mend it  "//mending_text(simulation)//newline
     text = text//"time        "//time_text(phases, seconds, simulation%effort%solves)//newline// &
-      & "to halve it "//halving_text(simulation, phases, seconds, looser_seconds)//newline
+      & "to halve it "//halving_text(simulation, phases, seconds, looser_seconds, slowest)//newline
   end function summary_lines
 
 end module gravier_closing_lines

@@ -3,11 +3,14 @@ module gravier_run_summary
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted, text_from
   use gravier_timers, only: phase_names, n_phases, phase_neighbourhood, phase_exchange, phase_factorise, phase_interface, &
-    & phase_interface_solve, phase_reduction, phase_diagnostics, phase_output
+    & phase_interface_solve, phase_reduction, phase_diagnostics, phase_output, phase_sweep, phase_check
   use gravier_convergence_history, only: at_tolerance
   use gravier_progress, only: duration_text
   use gravier_run_tally, only: far_off, often_mended
   use gravier_accuracy_lines, only: goal_name, goal_text, mean_size_name, drifts, percent, plain
+  use gravier_config_types, only: decomposition_config_t
+  use gravier_method_options, only: method_features_t, default_always
+  use gravier_method_registry, only: features_of
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -24,6 +27,10 @@ module gravier_run_summary
   integer(i8), parameter :: contacts_a_rank = 5000
   !> velocity error over its scale that a looser goal may lead to
   real(dp), parameter :: loosest = 0.1_dp
+  !> part of the run that a rank waits for the slowest one in the mean, from which on uneven subdomains are named
+  real(dp), parameter :: long_wait = 0.2_dp
+  !> plain iterations a solve from which on acceleration is advised: it takes a fifth of them and less (doc/acceleration.md)
+  integer(i8), parameter :: many_iterations = 50
 
 contains
 
@@ -305,7 +312,7 @@ contains
   end function time_text
 
   !> What would halve the time of the run, as far as its own figures tell. What is too loose is never advised to be looser.
-  function halving_text(simulation, phases, seconds, looser_seconds) result(text)
+  function halving_text(simulation, phases, seconds, looser_seconds, slowest) result(text)
     type(simulation_t), intent(in) :: simulation
     !> (n_phases), mean over the ranks [s]
     real(dp), intent(in) :: phases(n_phases)
@@ -313,10 +320,13 @@ contains
     real(dp), intent(in) :: seconds
     !> of its solves with ten times the goal: expected, at least and at most (negative: not known) [s]
     real(dp), intent(in) :: looser_seconds(3)
-    character(len=:), allocatable :: text
+    !> seconds of sweeps of the slowest rank over the mean
+    real(dp), intent(in) :: slowest
+    character(len=:), allocatable :: text, evening
     real(dp) :: half, shared, lost, rest
 
     half = 0.5_dp*seconds
+    evening = evening_text(simulation%config%decomposition, (slowest - 1.0_dp)*phases(phase_sweep)/max(seconds, tiny(seconds)))
     shared = phases(phase_exchange) + phases(phase_factorise) + phases(phase_interface_solve) + phases(phase_reduction) + &
       & phases(phase_interface)
     associate (effort => simulation%effort, config => simulation%config)
@@ -326,6 +336,8 @@ contains
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
           & to_text(simulation%comm%size)//" ranks own no subdomain and wait: choose as many &decomposition "// &
           & "subdomains as ranks, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
+      else if (evening /= "") then
+        text = evening
       else if (phases(phase_output) > half .and. config%output%every > 0 .and. config%output%every < config%time%steps) then
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (phases(phase_diagnostics) > half) then
@@ -340,6 +352,9 @@ contains
       else if (may_loosen(simulation) .and. looser_seconds(1) >= 0.0_dp .and. rest + looser_seconds(1) <= half) then
         text = goal_text(simulation, 10.0_dp)//", which is looser: "//duration_text(rest + looser_seconds(2))//" to "// &
           & duration_text(rest + looser_seconds(3))//" in all (estimated)"
+      else if (may_accelerate(simulation) .and. phases(phase_sweep) + phases(phase_check) + phases(phase_exchange) > half) then
+        text = "plain iterations take most of it, "//to_text(nint(real(effort%iterations, dp)/real(effort%solves, dp)))// &
+          & " a solve: &solver acceleration = 'momentum' takes fewer"
       else if (phases(phase_factorise) + phases(phase_interface_solve) > half .and. simulation%fallback%taken > 0 .and. &
         & .not. simulation%physics%laws%yields) then
         text = "Newton's method, which takes over solves that stagnate, takes most of it: contacts that yield "// &
@@ -359,6 +374,39 @@ contains
       end if
     end associate
   end function halving_text
+
+  !> What evens out the work of the ranks where they wait for the slowest one; empty where they hardly wait, or nothing is known to.
+  pure function evening_text(config, waiting) result(text)
+    type(decomposition_config_t), intent(in) :: config
+    !> of the run that a rank waits in the mean
+    real(dp), intent(in) :: waiting
+    character(len=:), allocatable :: text
+    logical :: by_graph, again
+
+    by_graph = config%partition == "metis"
+    again = config%repartition_imbalance > 0.0_dp
+    text = ""
+    if (.not. waiting > long_wait .or. (by_graph .and. again)) return
+    text = "ranks wait for the one with most sweeps to make, in "//to_text(nint(100.0_dp*waiting))// &
+      & " % of the time: &decomposition "
+    if (.not. by_graph) text = text//"partition = 'metis'"
+    if (.not. (by_graph .or. again)) text = text//" and "
+    if (.not. again) text = text//"repartition_imbalance = 1.2"
+    text = text//" divides the contacts more evenly"
+  end function evening_text
+
+  !> Whether plain iterations are many and may be accelerated.
+  logical function may_accelerate(simulation) result(may)
+    type(simulation_t), intent(in) :: simulation
+    type(method_features_t) :: features
+
+    associate (solver => simulation%config%solver, effort => simulation%effort)
+      features = features_of(trim(solver%method))
+      may = features%accelerated_by_default == default_always .or. (features%relaxes .and. .not. solver%relaxation_given)
+      may = may .and. solver%acceleration == "none" .and. simulation%tally%diverged == 0 .and. &
+        & effort%iterations >= many_iterations*effort%solves
+    end associate
+  end function may_accelerate
 
   !> Contacts of all subdomains of this rank.
   pure integer(i8) function contacts_of(simulation) result(contacts)

@@ -2,7 +2,8 @@
 program test_run_summary
   use gravier_kinds, only: dp
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_timers, only: n_phases, phase_factorise, phase_interface_solve, phase_neighbourhood, phase_output
+  use gravier_timers, only: n_phases, phase_factorise, phase_interface_solve, phase_neighbourhood, phase_output, phase_sweep, &
+    & phase_exchange, phase_check
   use gravier_run_summary, only: halving_text, converged_text, mending_text, verdict_text
   use gravier_simulation, only: simulation_t
   use gravier_test_simulations, only: make_scene
@@ -18,6 +19,8 @@ program test_run_summary
   call comm%init()
   call test_output()
   call test_newton()
+  call test_waiting()
+  call test_plain()
   call test_refuted()
   call test_misses()
   call finish_checks()
@@ -52,6 +55,54 @@ contains
     call check(.not. says(simulation, [phase_factorise, phase_interface_solve], "kind = 'elastic'"), "contacts that yield already")
     call simulation%free()
   end subroutine test_newton
+
+  !> Ranks that wait for the slowest one are named with what evens out their work, as far as it is not in force.
+  subroutine test_waiting()
+    type(simulation_t) :: simulation
+    character(len=*), parameter :: all = "partition = 'metis' and repartition_imbalance = 1.2 divides", waits = "ranks wait for"
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 /", simulation)
+    call check(says(simulation, [phase_sweep, phase_exchange], all, 1.5_dp), "sweeps of 45 %, half of which more on one rank")
+    call check(says(simulation, [phase_sweep, phase_exchange], " in 23 % of the time", 1.5_dp), "how long they wait")
+    call check(.not. says(simulation, [phase_sweep, phase_exchange], waits, 1.4_dp), "they wait a little")
+    call check(.not. says(simulation, [phase_output], waits, 2.0_dp), "sweeps take nothing")
+    simulation%config%decomposition%repartition_imbalance = 1.5_dp
+    call check(says(simulation, [phase_sweep], "&decomposition partition = 'metis' divides", 2.0_dp), "boxes that are made anew")
+    simulation%config%decomposition%partition = "metis"
+    call check(.not. says(simulation, [phase_sweep], waits, 2.0_dp), "nothing else is known to help")
+    simulation%config%decomposition%repartition_imbalance = 0.0_dp
+    call check(says(simulation, [phase_sweep], "&decomposition repartition_imbalance = 1.2 divides", 2.0_dp), "cells that stay")
+    call simulation%free()
+  end subroutine test_waiting
+
+  !> Acceleration is advised where plain iterations are many and take most of the time, but not where they diverged, or where it is
+  !> not to be had.
+  subroutine test_plain()
+    type(simulation_t) :: simulation
+    character(len=*), parameter :: words = "plain iterations take most of it, 60 a solve: &solver acceleration = 'momentum'"
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 / &solver method = 'schwarz' /", simulation)
+    simulation%effort%solves = 10
+    simulation%effort%iterations = 600
+    call check(says(simulation, [phase_sweep, phase_check], words), "many plain iterations")
+    call check(.not. says(simulation, [phase_output], words), "they take nothing")
+    simulation%config%solver%relaxation_given = .true.
+    call check(.not. says(simulation, [phase_sweep], words), "a relaxation that is given")
+    simulation%config%solver%relaxation_given = .false.
+    simulation%tally%diverged = 1
+    call check(.not. says(simulation, [phase_sweep], words), "solves that diverged")
+    simulation%tally%diverged = 0
+    simulation%config%solver%acceleration = "momentum"
+    call check(.not. says(simulation, [phase_sweep], words), "they are accelerated")
+    simulation%config%solver%acceleration = "none"
+    simulation%config%solver%method = "newton"
+    call check(.not. says(simulation, [phase_sweep], words), "a method without sweeps")
+    simulation%config%solver%method = "nlgs"
+    call check(says(simulation, [phase_sweep], words), "a method that has it by default")
+    simulation%effort%iterations = 400
+    call check(.not. says(simulation, [phase_sweep], words), "few iterations")
+    call simulation%free()
+  end subroutine test_plain
 
   !> Solves that reached the accuracy by their estimates, of which spot checks have found too many wrong: the run has not converged.
   subroutine test_refuted()
@@ -133,15 +184,19 @@ contains
   end subroutine test_misses
 
   !> Whether the advice has some words where these phases together take nine tenths of the time.
-  logical function says(simulation, dear, words)
+  logical function says(simulation, dear, words, slowest)
     type(simulation_t), intent(in) :: simulation
     integer, intent(in) :: dear(:)
     character(len=*), intent(in) :: words
-    real(dp) :: phases(n_phases)
+    !> seconds of the slowest rank over the mean; 1 where absent
+    real(dp), intent(in), optional :: slowest
+    real(dp) :: phases(n_phases), ratio
 
     phases(:) = 0.0_dp
     phases(dear) = 0.9_dp*seconds/size(dear)
-    says = index(halving_text(simulation, phases, seconds, unknown), words) > 0
+    ratio = 1.0_dp
+    if (present(slowest)) ratio = slowest
+    says = index(halving_text(simulation, phases, seconds, unknown, ratio), words) > 0
   end function says
 
 end program test_run_summary
