@@ -21,11 +21,11 @@ R = 0.01
 class States(gravier.Run):
     """States of grains as a run has them: positions, and radii R unless told."""
 
-    def __init__(self, *states, radius=None, period=None):
+    def __init__(self, *states, radius=None, period=None, walls=()):
         self.path, self.dimension = "states", len(states[0][0])
         self.period = np.zeros(self.dimension) if period is None else np.array(period)
         self.steps, self.times = np.arange(len(states)), 0.1 * np.arange(len(states))
-        self.case = {"material": [{"name": "sand"}, {"name": "steel"}]}
+        self.case, self.walls = {"material": [{"name": "sand"}, {"name": "steel"}], "boundary": [{"name": "gate", "remove_at": 0.1}]}, walls
         self.states = [gravier.Table(id=np.arange(1, len(state) + 1), position=np.array(state, dtype=float),
                                      radius=np.full(len(state), R) if radius is None else np.resize(radius, len(state))) for state in states]
 
@@ -34,6 +34,10 @@ class States(gravier.Run):
 
     def shapes(self):
         return []
+
+    def boundaries(self, step=None):
+        names, places, normals = zip(*self.walls) if self.walls else ((), (), ())
+        return gravier.Table(name=np.array(names), shape=np.full(len(names), "plane"), position=np.array(places), normal=np.array(normals))
 
 
 def grid(*counts):
@@ -181,8 +185,68 @@ class Heaps(unittest.TestCase):
             np.testing.assert_allclose([found.angle_low[0], found.angle_high[0]], 25.0, atol=1.5)
             np.testing.assert_allclose([-found.front_low[0], found.front_high[0]], np.abs(flat[:, 0]).max(), atol=3.0 * R)
 
+    def test_thin_front(self):
+        """Below the foot of a wedge a row of grains with holes of 0.4 diameters belongs to the heap, and what lies 0.6 diameters away does not: neither the end
+        of the heap nor its run-out depends on the width of columns."""
+        place, radius = wedge(25.0, 1.2), 1.3 * R
+        foot = place[:, 0].max()
+        row = np.stack([foot + 2.8 * R * np.arange(1, 21), np.full(20, R)], axis=1)
+        beyond = [[row[-1, 0] + 3.2 * R + 2.0 * R * k, R] for k in range(5)]
+        run = States(grid(20, 60), np.concatenate([place[place[:, 0] > 0.0], row, beyond, ASTRAY]))
+        for width in (0.5 * R, 2.0 * R, 4.0 * R, 8.0 * R):
+            found = gravier.heap(run, width=width)
+            np.testing.assert_allclose(found.front_high, [40.0 * R, row[-1, 0] + R], rtol=1e-12)
+            self.assertAlmostEqual(found.run_out[1], found.length[1] / (40.0 * R) - 1.0, places=12)
+        # of two sizes the gap is that of surfaces
+        run = States(np.array([[radius, radius], [2.0 * radius + R, R], [2.0 * radius + 4.0 * R, R], [2.0 * radius + 7.5 * R, R]]), radius=[radius, R, R, R])
+        self.assertAlmostEqual(gravier.heap(run).front_high[0], 2.0 * radius + 5.0 * R, places=12)
+
+    def test_rods(self):
+        """Rods that lie end to end hang together, though balls of their volume are far apart."""
+        run = States(R * np.stack([1.0 + 2.2 * np.arange(10), np.ones(10)], axis=1))
+        run.volumes = lambda bodies: 0.2 * np.pi * bodies.radius**2
+        found = gravier.heap(run)
+        self.assertAlmostEqual(found.front_high[0], (1.0 + 2.2 * 9 + np.sqrt(0.2)) * R, places=12)
+
+    def test_end_across(self):
+        """In space the end is a mean over the breadth of a channel, or over the rim of a round heap; grains hang together across a period too."""
+        bed = grid(10, 20, 2)
+        bed = bed[(bed[:, 0] < 10.0 * R) | (bed[:, 1] < 20.0 * R)]
+        self.assertAlmostEqual(gravier.heap(States(bed), along="x").front_high[0], 15.0 * R, delta=R)
+        # a row along y that only its image across the period links to the bed
+        row = np.array([[20.0 * R + 0.01 * R, 39.99 * R + 2.5 * R, R], [22.0 * R, 39.99 * R + 2.5 * R, R]])
+        for period, end in (([0.0, 42.5 * R, 0.0], 23.0 * R), (None, 20.0 * R)):
+            found = gravier.heap(States(np.concatenate([grid(10, 20, 1), row]), period=period), along="x")
+            self.assertLessEqual(found.front_high[0], end)
+            self.assertEqual(found.front_high[0] > 20.0 * R, period is not None)
+        disk = grid(60, 60, 1)
+        disk = disk[np.hypot(disk[:, 0] - 60.0 * R, disk[:, 1] - 60.0 * R) < 40.0 * R]
+        spoke = np.array([[100.0 * R + 2.0 * R * k, 60.0 * R, R] for k in range(1, 16)])
+        round_one = gravier.heap(States(disk, np.concatenate([disk, spoke])))
+        self.assertAlmostEqual(round_one.length[0], 40.0 * R, delta=1.5 * R)
+        self.assertLess(round_one.length[1] - round_one.length[0], 2.0 * R)
+
+    def test_channels_are_not_round(self):
+        """A heap that fills a period, or the breadth between two walls, along one axis is refused as round; one in the middle of them is not, nor is a bed
+        that fills both, or one beside a gate that is removed."""
+        flat = wedge(25.0, 0.6)
+        channel = np.concatenate([np.insert(flat, 1, y, axis=1) for y in R * (2.0 * np.arange(4) + 1.0)])
+        cone = wedge(30.0, 0.5, 3)
+        sides = [("a", [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]), ("b", [0.0, 8.0 * R, 0.0], [0.0, -1.0, 0.0])]
+        for run, words in ((States(channel, period=[0.0, 8.0 * R, 0.0]), "the period along y, so that the heap is not round; expected --along x"),
+                           (States(channel, walls=sides), "the breadth between two walls along y, .* expected --along x"),
+                           (States(channel[:, [1, 0, 2]], period=[8.0 * R, 0.0, 0.0]), "the period along x, .* expected --along y"),
+                           (States(cone, channel, period=[0.0, 8.0 * R, 0.0]), "expected --along x")):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.heap(run)
+        for run in (States(cone, period=[0.0, 4.0, 0.0]), States(grid(4, 4, 2), period=[8.0 * R, 8.0 * R, 0.0]), States(channel, walls=sides[:1]),
+                    States(channel, walls=[sides[0], ("gate", *sides[1][1:])])):
+            self.assertIn("angle", gravier.heap(run))
+
     def test_refusals(self):
         run = States(grid(3, 3))
+        with self.assertRaisesRegex(gravier.ResultsError, r"floor 5: above all grains of all states; expected the height of the floor"):
+            gravier.heap(run, floor=5.0)
         for words, options in (("along 'y': expected x", {"along": "y"}), ("shares 0.8 and 0.2", {"shares": (0.8, 0.2)}), ("width 0: expected", {"width": 0.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.heap(run, **options)
