@@ -11,7 +11,7 @@ try:
     import gravier
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
-from gravier.wall_tests import stresses_from  # noqa: E402
+from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
 from whole_file import claim, written  # noqa: E402
 
@@ -67,11 +67,12 @@ def said(table, run, options):
     lines = [f"last row: {', '.join(last)}"]
     if options.kind == "walls":
         sine = numpy.where(numpy.isfinite(table.sin_phi), table.sin_phi, -numpy.inf)
-        # the mean of a ratio is not that of the means
         peak, first = int(sine.argmax()), min(int(0.6 * len(table)), len(table) - 1)
-        axial, lateral = table.axial_stress[first:].mean(), table.lateral_stress[first:].mean()
+        last = sine_of_means(run, (options.axial, options.lateral, options.mean), first, options.since)
         lines.append(f"sin phi: largest {sine[peak]:.3g} at an axial strain of {table.axial_strain[peak]:.4g}, of the means of the last {len(table) - first} rows "
-                     f"{(axial - lateral) / (axial + lateral):.3g}; stresses are {stresses_from(run)}")
+                     f"{last:.3g}; stresses are {stresses_from(run)}")
+        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {time:.6g} leaves it out"
+                  for name, time, strain in ways_through_air(run, options.since)]
     return lines
 
 

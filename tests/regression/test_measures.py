@@ -1,5 +1,6 @@
 """Measures of states: mixing, heaps and tests between walls, of states whose values are known, with single grains astray, and of runs."""
 import os
+import re
 import sys
 import unittest
 
@@ -10,6 +11,7 @@ from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
 from gravier.mixing import lacey
+from gravier.wall_tests import sine_of_means
 
 matplotlib.use("Agg")
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
@@ -256,9 +258,30 @@ class Heaps(unittest.TestCase):
             gravier.heap(empty)
 
 
+class Sheared(States):
+    """A periodic cell with a grain, whose stress turns from step to step."""
+
+    directory = "states"
+
+    def __init__(self, principal, angles):
+        """Principal stresses, and the angles by which their axes are turned in the plane of x and the last axis."""
+        super().__init__(np.full((1, len(principal)), 1.0), period=np.full(len(principal), 1.0))
+        axes, last = "xyz"[:len(principal)], len(principal) - 1
+        columns = {"step": np.arange(1.0, len(angles) + 1), "time": 0.1 * np.arange(1, len(angles) + 1), "grains": np.ones(len(angles))}
+        turn = np.array([np.eye(len(principal))] * len(angles))
+        turn[:, 0, 0] = turn[:, last, last] = np.cos(angles)
+        turn[:, 0, last], turn[:, last, 0] = -np.sin(angles), np.sin(angles)
+        stress = turn @ np.diag(principal) @ turn.transpose(0, 2, 1)
+        columns.update({f"stress_{a}{b}": stress[:, i, j] for i, a in enumerate(axes) for j, b in enumerate(axes)})
+        self.columns = columns
+
+    def history(self):
+        return gravier.Table(self.columns)
+
+
 class WallTests(RunTestCase):
 
-    def squeezed(self, name, dimension=2, boundaries=None, more=None):
+    def squeezed(self, name, dimension=2, boundaries=None, more=None, steps=20, law=None):
         """A grain between planes that forces press together, or those that are given."""
         os.makedirs(self.here(name))
         axes = "xyz"[:dimension]
@@ -269,8 +292,10 @@ class WallTests(RunTestCase):
                                   "free": [bool(entry) for entry in unit[k]], "pressure": pressure, "mass": 1.0}
                                  for k, (axis, pressure) in enumerate(zip(axes, (1000.0, 2000.0, 3000.0)))]
         output = {"directory": ".", "every": 1000, "boundary_forces": True, **(more or {})}
-        run = run_case({"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "file", "bodies_file": "one.csv"}, "boundary": planes,
-                        "time": {"step": 1e-3, "steps": 20}, "solver": {"accuracy": 1e-6}, "output": output}, 1, self.here(name))
+        laws = {"material": {"name": "sand"}, "law": {"materials": "sand", **law}} if law else {}
+        scene = {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "file", "bodies_file": "one.csv", **({"wall_material": "sand"} if law else {})}
+        run = run_case({"scene": scene, **laws, "boundary": planes,
+                        "time": {"step": 1e-3, "steps": steps}, "solver": {"accuracy": 1e-6}, "output": output}, 1, self.here(name))
         self.assert_status(run, 0)
         return gravier.Run(self.here(name))
 
@@ -289,6 +314,36 @@ class WallTests(RunTestCase):
         for options, ratio in (({}, 2.0), ({"lateral": "x"}, 3.0), ({"lateral": ["y"]}, 1.5), ({"axial": "x"}, 0.4)):
             self.assertAlmostEqual(gravier.wall_test(run, **options).stress_ratio[-1], ratio, places=6)
         self.assertAlmostEqual(gravier.wall_test(run).solid_fraction[-1], np.pi / 6.0, places=6)
+
+    def test_principal_stresses(self):
+        """sin phi is that of the principal stresses, whatever their axes; of means it is that of the mean stresses."""
+        for principal in ((300.0, 100.0), (300.0, 250.0, 100.0), (100.0, 150.0, 300.0)):
+            angles = np.radians([0.0, 20.0, 45.0, 90.0, 45.0, 45.0])
+            run = Sheared(principal, angles)
+            found = gravier.wall_test(run)
+            np.testing.assert_allclose(found.sin_phi, 0.5, rtol=1e-12)
+            # along the axes there is nothing to see at 45 degrees
+            np.testing.assert_allclose(found.axial_stress[2], 200.0)
+            # turned by 45 and 90 degrees: 2 cos 45 degrees of shear and difference are left of 2
+            self.assertAlmostEqual(gravier.wall_test(run, mean=2).sin_phi[1], 0.5 * np.sqrt(0.5), places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 1), 2), gravier.wall_test(run, mean=4, since=0.25).sin_phi[0], places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 2), 1), gravier.wall_test(run, mean=4, since=0.25).sin_phi[0], places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 1), 0), gravier.wall_test(run, mean=6).sin_phi[0], places=12)
+
+    def test_way_through_air(self):
+        """A lid that is 0.8 radii above the grain and comes down at 0.1 m/s bears nothing for 80 steps of 1 ms; the command says when and how much strain this is."""
+        walls = [{"name": "side", "shape": "plane", "point": [2.0 * R, 0.0], "normal": [-1.0, 0.0]},
+                 {"name": "lid", "shape": "plane", "point": [0.0, 2.8 * R], "normal": [0.0, -1.0], "velocity": [0.0, -0.1]}]
+        self.squeezed("air", boundaries=walls, more={"stress": True}, steps=81, law={"kind": "elastic", "normal_stiffness": 1e6})
+        measured = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "walls", "air", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual((measured.returncode, measured.stderr), (0, ""))
+        found = re.search(r"\nlid bears nothing before (\S+) s, and strains count (\S+) for its way until then; --since \1 leaves it out\n", measured.stdout)
+        self.assertTrue(found, measured.stdout)
+        self.assertAlmostEqual(float(found[1]), 0.08, delta=0.0015)
+        self.assertAlmostEqual(float(found[2]), 0.1 * 0.079 / (2.8 * R), delta=0.006)
+        later = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "walls", "air", "--since", found[1], directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual(later.returncode, 0, later.stderr)
+        self.assertNotIn("bears nothing", later.stdout)
 
     def test_strains(self):
         """A lid that comes down at 0.1 m/s and a side that goes out at 0.05 m/s: strains are those of their ways since the end of a step; old walls that
