@@ -7,7 +7,7 @@ import numpy as np
 
 from .case import CaseError, entries
 from .checksum import is_whole
-from .run_words import verdict
+from .run_words import doubts, verdict
 from .shapes import axes_of, ball, shapes_of
 from .starts import Start, starts_in
 from .tables import ResultsError, Table, one_line, read_table
@@ -295,13 +295,20 @@ class Run:
         return found
 
     def verdict(self):
-        """What run.log says of the whole run, restarts with it: 'converged', 'not converged', 'converged only by' another criterion than the velocity
-        error, or 'not finished'."""
+        """What run.log says of the whole run, restarts with it: 'converged', 'converged with doubts', which `doubts` has, 'not converged', 'converged only by'
+        another criterion than the velocity error, or 'not finished'."""
+        return verdict(self._log())
+
+    def doubts(self):
+        """What makes the results less than converged ones, in the words of run.log: projected or large overlaps, grains too fast for the step, large errors of
+        velocities, drift, fallen grains. Empty where there is nothing of the kind."""
+        return doubts(self._log())
+
+    def _log(self):
         try:
-            text = (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
+            return (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
         except OSError as reason:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
-        return verdict(text)
 
     def history(self):
         """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""

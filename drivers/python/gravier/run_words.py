@@ -1,7 +1,9 @@
-"""What run.log says of convergence, over all starts of a run."""
+"""What run.log says of convergence and of doubts, over all starts of a run."""
 import re
 
 VERDICTS = {"yes": "converged", "NO": "not converged"}
+#: parts of the last words that raise no doubt: projections that shift grains by a little of their paths, and what the words are of
+HARMLESS = re.compile(r"overlaps were projected in .* of the paths of grains$|errors and overlaps are those since the restart$")
 
 
 def starts_of(text):
@@ -24,8 +26,18 @@ def convergence(text):
     return worst or (doubts or said or [""])[-1]
 
 
+def doubts(text):
+    """What makes the results less than the begin of the last words says: large errors of velocities, overlaps, grains too fast for the step, drift, fallen
+    grains; of all starts, as the lines `finished` have it. Empty where there is nothing of the kind."""
+    found = []
+    for lines in starts_of(text):
+        _, *parts = re.split(r"; |, but ", said_of(lines, "finished").rpartition("; results in ")[0])
+        found += [part.replace(" of them", " of the steps") for part in parts if not HARMLESS.match(part)]
+    return "; ".join(dict.fromkeys(found))
+
+
 def verdict(text):
-    """'converged', 'not converged', 'converged only by' or 'not finished': of a whole log."""
+    """'converged', 'converged with doubts', 'not converged', 'converged only by' or 'not finished': of a whole log."""
     last = said_of(starts_of(text)[-1], "finished")
     if not last:
         return "not finished"
@@ -33,4 +45,5 @@ def verdict(text):
         return "not converged"
     said = convergence(text)
     # without a step there is nothing to say
-    return VERDICTS.get(said.split(":")[0], "converged only by") if said else "converged"
+    found = VERDICTS.get(said.split(":")[0], "converged only by") if said else "converged"
+    return "converged with doubts" if found == "converged" and doubts(text) else found
