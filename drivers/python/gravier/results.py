@@ -9,7 +9,7 @@ from .case import CaseError, entries
 from .checksum import is_whole
 from .run_words import doubts, verdict
 from .shapes import axes_of, ball, shapes_of
-from .starts import Start, starts_in
+from .starts import Start, starts_in, text_of
 from .tables import ResultsError, Table, one_line, read_table
 
 #: columns without which nothing can be drawn
@@ -183,7 +183,7 @@ class Run:
             for key in ("name", "shape"):
                 if file[f"boundaries/{key}"].dtype.kind in "iuf":
                     raise ResultsError(f"{self.path}: /boundaries/{key}: numbers; expected texts")
-                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
+                rows[key] = np.array([text_of(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
         for key in {"edges", "axes"} & set(rows):
             rows[key] = rows[key].reshape(len(rows[key]), -1, self.dimension)
         return rows
@@ -234,7 +234,7 @@ class Run:
                 return []
             tables = {name: Table({key: self._values(value) for key, value in group.items() if isinstance(value, h5py.Dataset)})
                       for name, group in [("shapes", file["shapes"]), *file["shapes"].items()] if isinstance(group, h5py.Group)}
-        tables["shapes"]["name"] = np.array([_text(value) for value in tables["shapes"].name])
+        tables["shapes"]["name"] = np.array([text_of(value) for value in tables["shapes"].name])
         return shapes_of(tables)
 
     def outlines(self, step=None):
@@ -506,7 +506,3 @@ def _path(given, what):
         return Path(given)
     except TypeError:
         raise ResultsError(f"{given!r}: expected the path of {what}") from None
-
-
-def _text(value):
-    return value.decode() if isinstance(value, bytes) else str(value)
