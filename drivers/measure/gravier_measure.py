@@ -11,6 +11,7 @@ try:
     import gravier
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
+from gravier.measured import write_measured  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
 from whole_file import claim, written  # noqa: E402
@@ -89,7 +90,7 @@ def main(arguments=None):
         print(f"gravier_measure: error: {plain(refused)}", file=sys.stderr)
         return 2
     with written(out, kinds) as part:
-        gravier.write_table(part, table, 9)
+        write_measured(part, run, table)
     print("\n".join([*lines, str(out)]))
     return 0
 

@@ -5,7 +5,7 @@ import unittest
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, gravier, write
 
-from gravier import Run, read_table, write_table
+from gravier import ResultsError, Run, read_table, write_table
 
 CASE = """&scene bodies = 'file', bodies_file = 'bodies.csv', friction = 0.3, alert_distance = 0.001 /
 &boundary name = 'côté λ', shape = 'plane', point = 0.0, 0.0, normal = 1.0, 0.0 /
@@ -51,6 +51,42 @@ class FilesOfRuns(RunTestCase):
                     self.assertEqual((status, said), (0, ""), (tool, arguments))
                 write_table(self.here("copy.csv"), run.history())
                 self.assertEqual(list(read_table(self.here("copy.csv"))), list(run.history()))
+
+    def test_tables_of_an_older_run(self):
+        """Tables of gravier_measure are drawn of the run that they were measured from, also after it has gone on, and of no other run in the same directory."""
+        self.run_text(CASE.replace("trace = .true.", "checkpoint_every = 30"))
+        for kind in ("heap", "walls"):
+            self.assertEqual(self.tool("gravier_measure", kind, "out")[0], 0)
+            self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv"), (0, f"out/{kind}.png\n", ""))
+        # the run goes on: the tables are of its first part
+        self.run_text(CASE.replace("trace = .true.", "checkpoint_every = 30").replace("steps = 30", "steps = 50"), "--restart")
+        self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", "heap.csv")[0], 0)
+        # another friction: the first state is the same, and so are names and times
+        self.run_text(CASE.replace("friction = 0.3", "friction = 0.0").replace("every = 10", "every = 0"))
+        for kind in ("heap", "walls"):
+            status, said, error = self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv")
+            self.assertEqual((status, said, error), (2, "", f"gravier_plot: out/{kind}.csv: measured from another run than the one whose results are in out; expected a table of "
+                                                            "this run, which gravier_measure makes anew\n"))
+            self.assertEqual(self.tool("gravier_measure", kind, "out")[0], 0)
+            self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv")[0], 0)
+        # a table of another origin is taken as it is
+        write(self.here("out", "mine.csv"), "time,value\n0,1\n1,2\n")
+        self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", "mine.csv")[0], 0)
+
+    def test_outputs_of_an_older_run(self):
+        """trace.csv and bodies.vtkhdf of an older run are not those of a new one that does not write them; those that one start of a run has written are its own."""
+        text = CASE.replace("trace = .true.", "trace = .true., vtk = .true., checkpoint_every = 30")
+        self.run_text(text)
+        self.run_text(text.replace("trace = .true., vtk = .true., ", "").replace("steps = 30", "steps = 50"), "--restart")
+        run = Run(self.here("out"))
+        self.assertEqual((len(run.starts), run.trace().step.max(), len(run.subdomain(30))), (2, 30, 20))
+        self.run_text(text.replace("trace = .true., vtk = .true., ", ""))
+        for read, name, key in ((Run(self.here("out")).trace, "trace.csv", "trace"), (Run(self.here("out")).subdomain, "bodies.vtkhdf", "vtk")):
+            with self.assertRaisesRegex(ResultsError, f"out/{name}: of an older run in this directory, since this one has no &output {key} = .true.; expected a run that writes it"):
+                read()
+        status, _, error = self.tool("gravier_plot", "convergence", "out")
+        self.assertEqual(status, 2)
+        self.assertRegex(error, r"^gravier_plot: out/trace.csv: of an older run in this directory, .*\n$")
 
 
 if __name__ == "__main__":

@@ -316,7 +316,14 @@ class Run:
 
     def trace(self):
         """trace.csv: a row a check of a solve; written with `trace = .true.`."""
+        self._check_own("trace.csv", "trace")
         return read_table(self.directory / "trace.csv", ("step", "iteration", "residual"))
+
+    def _check_own(self, name, key):
+        """Refuse a file of an older run in the same directory: one that no case of this run asks for."""
+        path = self.directory / name
+        if path.exists() and not any(keys.get(key) is True for start in self.starts for keys in start.case.get("output", [])):
+            raise ResultsError(f"{path}: of an older run in this directory, since this one has no &output {key} = .true.; expected a run that writes it")
 
     def _split(self, rows):
         if rows is None:
@@ -374,6 +381,7 @@ class Run:
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
         step = self.find_step(step)
         path = self.directory / "bodies.vtkhdf"
+        self._check_own("bodies.vtkhdf", "vtk")
         with _opened(path, "that of a run with &output vtk = .true.") as file:
             steps = file["VTKHDF/Steps"]
             count = int(steps.attrs["NSteps"])
