@@ -53,22 +53,24 @@ class FilesOfRuns(RunTestCase):
                 self.assertEqual(list(read_table(self.here("copy.csv"))), list(run.history()))
 
     def test_tables_of_an_older_run(self):
-        """Tables of gravier_measure are drawn of the run that they were measured from, also after it has gone on, and of no other run in the same directory."""
-        self.run_text(CASE.replace("trace = .true.", "checkpoint_every = 30"))
-        for kind in ("heap", "walls"):
-            self.assertEqual(self.tool("gravier_measure", kind, "out")[0], 0)
-            self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv"), (0, f"out/{kind}.png\n", ""))
-        # the run goes on: the tables are of its first part
-        self.run_text(CASE.replace("trace = .true.", "checkpoint_every = 30").replace("steps = 30", "steps = 50"), "--restart")
-        self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", "heap.csv")[0], 0)
-        # another friction: the first state is the same, and so are names and times
-        self.run_text(CASE.replace("friction = 0.3", "friction = 0.0").replace("every = 10", "every = 0"))
-        for kind in ("heap", "walls"):
-            status, said, error = self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv")
-            self.assertEqual((status, said, error), (2, "", f"gravier_plot: out/{kind}.csv: measured from another run than the one whose results are in out; expected a table of "
+        """Tables of gravier_measure are drawn of the run that they were measured from, also after it has gone on, and of no other run in the same directory:
+        states tell it apart, and history.csv where the last row is before the next state."""
+        for kind, every, *options in (("heap", 10), ("walls", 0, "--mean", "20")):
+            with self.subTest(kind=kind):
+                text = CASE.replace("trace = .true.", "checkpoint_every = 30").replace("every = 10", f"every = {every}")
+                drawn = ("gravier_plot", "history", "out", "--table", f"{kind}.csv")
+                self.run_text(text)
+                self.assertEqual(self.tool("gravier_measure", kind, "out", *options)[0], 0)
+                self.assertEqual(self.tool(*drawn), (0, f"out/{kind}.png\n", ""))
+                # the run goes on: the table is of its first part
+                self.run_text(text.replace("steps = 30", "steps = 50"), "--restart")
+                self.assertEqual(self.tool(*drawn)[0], 0)
+                # another speed of the piston: the first state is the same, and so are names and times
+                self.run_text(text.replace("velocity = 0.0, -0.1", "velocity = 0.0, -0.12"))
+                self.assertEqual(self.tool(*drawn), (2, "", f"gravier_plot: out/{kind}.csv: measured from another run than the one whose results are in out; expected a table of "
                                                             "this run, which gravier_measure makes anew\n"))
-            self.assertEqual(self.tool("gravier_measure", kind, "out")[0], 0)
-            self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", f"{kind}.csv")[0], 0)
+                self.assertEqual(self.tool("gravier_measure", kind, "out", *options)[0], 0)
+                self.assertEqual(self.tool(*drawn)[0], 0)
         # a table of another origin is taken as it is
         write(self.here("out", "mine.csv"), "time,value\n0,1\n1,2\n")
         self.assertEqual(self.tool("gravier_plot", "history", "out", "--table", "mine.csv")[0], 0)
