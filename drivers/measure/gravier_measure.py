@@ -12,6 +12,7 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
 from gravier.measured import write_measured  # noqa: E402
+from gravier.mixing import split_radius  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
 from whole_file import claim, written  # noqa: E402
@@ -66,6 +67,9 @@ def said(table, run, options):
     last = [f"{name.replace('_', ' ')} {values[-1]:.4g} {UNITS.get(name) or (unit if name.endswith('_stress') else '')}".rstrip()
             for name, values in table.items() if name != "step"]
     lines = [f"last row: {', '.join(last)}"]
+    if options.kind == "mixing" and options.by == "size":
+        limit, one_range = split_radius(run, options.value, options.since)
+        lines.append(f"the first kind has radii above {limit:.4g} m" + ("; radii have no gap there: this divides one range of sizes, not two kinds" if one_range else ""))
     if options.kind == "walls":
         sine = numpy.where(numpy.isfinite(table.sin_phi), table.sin_phi, -numpy.inf)
         peak, first = int(sine.argmax()), min(int(0.6 * len(table)), len(table) - 1)

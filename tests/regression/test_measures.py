@@ -10,7 +10,7 @@ import numpy as np
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
-from gravier.mixing import lacey
+from gravier.mixing import lacey, split_radius
 from gravier.wall_tests import sine_of_means
 
 matplotlib.use("Agg")
@@ -91,6 +91,14 @@ class Mixing(unittest.TestCase):
         for value in (None, 2, "2", "steel"):
             self.assertEqual(gravier.mixing(run, by="material", value=value).segregation[0], table.segregation[0])
         self.assertAlmostEqual(gravier.mixing(run, by="material", value="sand").segregation[0], 1.0, places=12)
+
+    def test_one_range_of_sizes(self):
+        """The radius that divides sizes is known, and so is whether it divides two kinds or one range."""
+        bed = grid(20, 20)
+        for radius, value, known in ((np.linspace(1.0, 2.0, 400), None, (1.5, True)), (np.linspace(1.0, 2.0, 400), 1.2, (1.2, True)),
+                                     (np.repeat([1.0, 2.0], 200), None, (1.5, False)), (np.concatenate([np.linspace(1.0, 1.2, 200), np.linspace(1.8, 2.0, 200)]), None, (1.5, False)),
+                                     (np.repeat([1.0, 1.5, 2.0], [100, 100, 200]), None, (1.5, False)), (np.ones(400), 5.0, (5.0, False))):
+            self.assertEqual(split_radius(States(bed, radius=radius), value), known)
 
     def test_stray_grain(self):
         """One grain of 400 that flies away changes nothing that matters."""
@@ -429,7 +437,7 @@ class Command(RunTestCase):
         self.assertLess(found.height[-1], 0.6 * found.height[0])
         self.assertTrue(5.0 < found.angle_high[-1] < 40.0, found.angle_high[-1])
         done = self.measure("mixing", "results", "--cell", "0.05", "--out", "sizes.csv")
-        self.assertEqual((done.returncode, done.stdout.splitlines()[-1]), (0, "sizes.csv"), done.stderr)
+        self.assertEqual((done.returncode, done.stdout.splitlines()[1:]), (0, ["the first kind has radii above 0.012 m", "sizes.csv"]), done.stderr)
         sizes = gravier.read_table(os.path.join(self.directory, "sizes.csv"))
         np.testing.assert_allclose(sizes.share, 12 / 87)
         self.assertAlmostEqual(sizes.segregation[0], -1.0, places=6)
@@ -492,7 +500,7 @@ class Command(RunTestCase):
                                  (["heap", "results", "--out", "results/history.csv"], "history.csv: there is a file of another kind or origin"),
                                  (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
                                  (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
-                                 (["mixing", "results", "--by", "material"], "material None; expected one of"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
+                                 (["mixing", "results", "--by", "material"], "results.h5: no second material; expected one of none, the case has no &material"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
                                  (["walls", "results", "--mean", "0"], "expected an integer >= 1"),
                                  (["outflow", "results"], "no column left_mass; expected a run with a boundary of shape outlet"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
             with self.subTest(arguments=arguments):
