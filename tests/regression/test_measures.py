@@ -10,6 +10,7 @@ import numpy as np
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
+from gravier.linked_grains import components, near_pairs
 from gravier.mixing import lacey, split_radius
 from gravier.wall_tests import sine_of_means
 
@@ -210,6 +211,23 @@ class Heaps(unittest.TestCase):
         # of two sizes the gap is that of surfaces
         run = States(np.array([[radius, radius], [2.0 * radius + R, R], [2.0 * radius + 4.0 * R, R], [2.0 * radius + 7.5 * R, R]]), radius=[radius, R, R, R])
         self.assertAlmostEqual(gravier.heap(run).front_high[0], 2.0 * radius + 5.0 * R, places=12)
+
+    def test_near_pairs(self):
+        """Pairs of balls of many sizes within a gap, and what hangs together by them, are those of all pairs, in the plane and in space, with one ball far away."""
+        rng = np.random.default_rng(5)
+        for dimension, spread, gap in ((2, 0.0, 0.0), (2, 3.0, 0.01), (3, 0.5, 0.02), (3, 3.0, 0.0)):
+            place, radius = rng.uniform(0.0, 1.0, (200, dimension)), 0.01 * np.exp(rng.uniform(0.0, spread, 200))
+            place[7] = 1e9
+            away = np.linalg.norm(place[:, None] - place[None], axis=2) - radius[:, None] - radius[None]
+            known = (away <= gap) & ~np.eye(200, dtype=bool)
+            found = np.zeros_like(known)
+            i, j = near_pairs(place, radius, gap)
+            found[i, j] = found[j, i] = True
+            np.testing.assert_array_equal(found, known)
+            reach = known | np.eye(200, dtype=bool)
+            for _ in range(8):
+                reach = reach.astype(float) @ reach > 0.0
+            np.testing.assert_array_equal(components(200, i, j), reach.argmax(axis=1))
 
     def test_rods(self):
         """Rods that lie end to end hang together, though balls of their volume are far apart."""
