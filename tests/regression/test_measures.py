@@ -365,6 +365,8 @@ class WallTests(RunTestCase):
         self.assertEqual((measured.returncode, measured.stderr), (0, ""))
         found = re.search(r"\nlid bears nothing before (\S+) s, and strains count (\S+) for its way until then; --since \1 leaves it out\n", measured.stdout)
         self.assertTrue(found, measured.stdout)
+        # the floor, which does not move, bears nothing either
+        self.assertEqual(measured.stdout.count("bears nothing"), 1)
         self.assertAlmostEqual(float(found[1]), 0.08, delta=0.0015)
         self.assertAlmostEqual(float(found[2]), 0.1 * 0.079 / (2.8 * R), delta=0.006)
         later = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "walls", "air", "--since", found[1], directory=self.scratch, environment=ENVIRONMENT)

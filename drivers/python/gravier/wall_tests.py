@@ -65,8 +65,8 @@ def ways_through_air(run, since=0.0):
         size = history[f"position_{axis}:{names[1]}"] - history[f"position_{axis}:{names[0]}"]
         strain = 1.0 - size / size[0]
         for name in names:
-            bears = np.flatnonzero(history[f"force_{axis}:{name}"] != 0.0)
-            if len(bears) > 0 and abs(strain[bears[0]]) > TOLD * np.abs(strain).max():
+            bears, place = np.flatnonzero(history[f"force_{axis}:{name}"] != 0.0), history[f"position_{axis}:{name}"]
+            if len(bears) > 0 and abs(place[bears[0]] - place[0]) > TOLD * np.abs(strain).max() * size[0]:
                 found.append((name, float(history.time[bears[0]]), float(strain[bears[0]])))
     return found
 
