@@ -52,6 +52,13 @@ class Verdict(RunTestCase):
             self.assertEqual((doubts(begin + words + end + NONE), verdict(begin + words + end + YES)), (told, said))
             self.assertEqual(doubts(2 * (begin + words + end)), told)
         self.assertEqual(doubts(MISSED), "")
+        # a start that was interrupted has no last words
+        for share, way, depth, told in ((59, "1.3E-01", "2.1E+00", "overlaps were projected in 98 % of the 60 steps before an interruption: the results are not those of the contact law; "
+                                         "overlaps came to 2.1 of the mean radius"), (6, "1.3E-01", "1.0E-01", ""), (59, "9.9E-03", "1.1E-01", "overlaps came to 0.11 of the mean radius")):
+            part = (f"{HEAD}overlaps    in the first step at most 0.00E+00 m, later at most 1.03E-02 m, {depth} of the mean radius\n            projected in {share} of 60 steps (98 %): "
+                    f"shifts of a grain add up to 6.78E-03 m on average, {way} of its path of 5.22E-02 m\n")
+            self.assertEqual(doubts(f"{part}interrupted *** at the walltime\n{YES}"), told)
+            self.assertEqual(doubts(f"{part}finished    all 60 steps reached the accuracy; results in out\n"), "")
 
     def test_step_that_is_too_long(self):
         """Grains that fall by more than their radius in a step: the verdict, the table of a study and gravier_job tell of it, though each solve has converged."""
