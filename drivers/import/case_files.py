@@ -114,13 +114,19 @@ def find_program():
 
 
 def check(case, folder, name, final):
-    """Refuse a case that the program refuses; without a program say so."""
+    """Refuse a case that the program refuses, or that it cannot check; without a program say so."""
     program = find_program()
     if program is None:
         case.remarks.append(f"there is no program gravier beside this script or in PATH: {final} is not checked; see gravier --check {final}")
         return
     # the program runs by itself, whatever launcher has started this script
-    done = subprocess.run([program, "--check", name], cwd=folder, capture_output=True, text=True, check=False)
+    done = subprocess.run([program, "--check", name], cwd=folder, capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
-        said = next((line for line in done.stderr.splitlines() if "gravier: error: " in line), f"status {done.returncode}")
-        raise Refused(f"{final}: gravier --check refuses the case that was made: {said.removeprefix('gravier: error: ')}")
+        said = next((line for line in done.stderr.splitlines() if "gravier: error: " in line), None)
+        if said is not None:
+            raise Refused(f"{final}: gravier --check refuses the case that was made: {said.removeprefix('gravier: error: ')}")
+        # what a launcher or a library says, or nothing
+        for line in done.stderr.splitlines():
+            print(plain(line), file=sys.stderr)
+        raise Refused(f"{final}: {program} --check ended with status {done.returncode}, without a word on the case that was made; expected a program gravier that runs, or none "
+                      "in the place of this one, with which the case is not checked")

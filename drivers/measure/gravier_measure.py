@@ -13,7 +13,9 @@ try:
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
 from gravier.force_networks import directions_of, distribution_of, networks, table_of  # noqa: E402
-from gravier.wall_tests import stresses_from  # noqa: E402
+from gravier.measured import write_measured  # noqa: E402
+from gravier.mixing import split_radius  # noqa: E402
+from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
 from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
 from whole_file import PICTURES, claim, written  # noqa: E402
 
@@ -112,13 +114,17 @@ def in_words(row, run):
 def said(table, run, options, together=None):
     """The last row in words, of a test its strength, and of forces those of all states."""
     lines = [f"last row: {in_words({name: values[-1] for name, values in table.items()}, run)}"]
+    if options.kind == "mixing" and options.by == "size":
+        limit, one_range = split_radius(run, options.value, options.since)
+        lines.append(f"the first kind has radii above {limit:.4g} m" + ("; radii have no gap there: this divides one range of sizes, not two kinds" if one_range else ""))
     if options.kind == "walls":
         sine = numpy.where(numpy.isfinite(table.sin_phi), table.sin_phi, -numpy.inf)
-        # the mean of a ratio is not that of the means
         peak, first = int(sine.argmax()), min(int(0.6 * len(table)), len(table) - 1)
-        axial, lateral = table.axial_stress[first:].mean(), table.lateral_stress[first:].mean()
+        last = sine_of_means(run, (options.axial, options.lateral, options.mean), first, options.since)
         lines.append(f"sin phi: largest {sine[peak]:.3g} at an axial strain of {table.axial_strain[peak]:.4g}, of the means of the last {len(table) - first} rows "
-                     f"{(axial - lateral) / (axial + lateral):.3g}; stresses are {stresses_from(run)}")
+                     f"{last:.3g}; stresses are {stresses_from(run)}")
+        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {time:.6g} leaves it out"
+                  for name, time, strain in ways_through_air(run, options.since)]
     if together:
         lines.append(f"all states: {in_words({name: values[0] for name, values in together.items() if name != 'time'}, run)}")
     return lines
@@ -148,7 +154,11 @@ def main(arguments=None):
         return 2
     for name, place in places.items():
         with written(place, {".csv": HEADS[name]}) as part:
-            gravier.write_table(part, tables[name], 9)
+            # tables without steps are those of all states together
+            if "step" in tables[name]:
+                write_measured(part, run, tables[name])
+            else:
+                gravier.write_table(part, tables[name], 9)
     print("\n".join([*lines, *map(str, places.values()), *([str(picture)] if picture else [])]))
     return 0
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import FuncFormatter
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
-from gravier import read_table
+from gravier.measured import read_measured
 
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
@@ -166,7 +166,7 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
 def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
     """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
     many rows. Columns are all that the first run has numbers in unless told."""
-    histories = [run.history() if table == "history.csv" else read_table(run.directory / table, ("time",)) for run in runs]
+    histories = [run.history() if table == "history.csv" else read_measured(run, table) for run in runs]
     columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
         if len(history) == 0:

@@ -2,14 +2,12 @@
 import re
 
 import numpy
+from gravier.run_words import DEEP, LITTLE, OFTEN
 from one_line import counted
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
-#: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
-#: shifts are small, the velocity error over U
-OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
-#: overlaps, in mean radii, up to which grains are where they should be, and beyond which they are in each other
-SHALLOW, DEEP = 0.02, 0.1
+#: as the last words of the program judge: the velocity error over U; overlaps, in mean radii, up to which grains are where they should be
+FAR_OFF, SHALLOW = 0.5, 0.02
 #: the question whose answer says nothing of the run
 FILES = "Are its files there and whole?"
 #: the parts of the sizes of its terms up to which a balance is one, and up to which it is nearly one

@@ -20,7 +20,6 @@ from study_support import (OneLineParser, claimed, draw_disks, lattice, plt, rea
                            whole, write_csv, write_hdf5)
 from whole_file import save_figure
 
-from gravier.heaps import ends
 
 STEP = 5.0e-4  # s
 # radii [m], grains of a column, aspect ratios aimed at, flat columns below the one and tall ones above the other measured
@@ -113,6 +112,21 @@ def collapse(folder, case, column, measure):
     height = 2.0 * settled[:, -1].mean()
     centres, radii, _ = read_bodies(folder / "final_bodies.h5")
     return width, height, length_of(centres[:n], radii[:n], case.bin), (centres[:n], radii[:n])
+
+
+def ends(place, volume, ground, layer, bins):
+    """Where a layer of grains ends that begins at 0: from each of the first bins on the first bin whose grains, over its ground, are thinner than
+    `layer` [m], its lower end. `place` (n) are distances from the beginning [m], `volume` (n) those of grains, `ground` gives area or length
+    between 0 and a distance, `bins` the width of bins, the number of places of the first bin and the place from which bins count [m]."""
+    wide, places, inner = bins
+    found = []
+    for first in np.arange(places) / places * wide:
+        # one of more bins than grains is empty, however far away a grain is
+        edges = np.arange(first, min(place.max(initial=0.0) + 3.0 * wide, first + (len(place) + 5) * wide), wide)
+        thickness = np.histogram(place, edges, weights=volume)[0] / np.diff(ground(edges))
+        thickness[edges[:-1] < inner] = np.inf
+        found.append(edges[np.flatnonzero(thickness < layer)[0]])
+    return np.array(found)
 
 
 def length_of(centres, radii, wide, places=20):

@@ -64,8 +64,7 @@ contains
         end if
         boundary%material = material_number(config, config%boundaries(b)%material)
         if (boundary%is_faceted()) call read_facets(trim(config%boundaries(b)%file), nd, boundary, error)
-        if (config%boundaries(b)%table /= "") call boundary%drive%table%read( &
-          & trim(config%boundaries(b)%table), drive_names(nd), config%boundaries(b)%table_repeats, error)
+        call read_table(trim(config%boundaries(b)%table), nd, config%boundaries(b)%table_repeats, boundary, error)
       end associate
     end do
     call comm%agree(error)
@@ -233,6 +232,22 @@ contains
     if (boundary%surface%n_facets() == 0) call raise(error, status_input, "boundary '"//boundary%name//"': file: "//path// &
       & ": expected a facet with "//trim(merge("a length", "an area ", nd == 2)))
   end subroutine read_facets
+
+  !> Read the table of a drive, where there is one. Failures: as of the table, with the boundary.
+  subroutine read_table(path, nd, repeats, boundary, error)
+    !> empty without a table
+    character(len=*), intent(in) :: path
+    integer, intent(in) :: nd
+    logical, intent(in) :: repeats
+    type(boundary_t), intent(inout) :: boundary
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (path == "" .or. allocated(error)) return
+    call boundary%drive%table%read(path, drive_names(nd), repeats, error)
+    if (.not. allocated(error)) return
+    if (index(error%message, path//": ") == 1) error%message = path//": table of boundary '"//boundary%name//"': "// &
+      & error%message(len(path) + 3:)
+  end subroutine read_table
 
   !> Refuse a table with a column that would do nothing, or that turns what forces move.
   subroutine check_table(boundary, nd, path, error)

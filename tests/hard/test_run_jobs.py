@@ -111,10 +111,11 @@ class Jobs(RunTestCase):
                                                              "replaced; expected a template of another name\n"))
         with open(own, encoding="utf-8") as file:
             self.assertEqual(file.read(), "! mine\n")
-        # a list from Windows with blank lines; a row that is wrong is found before the first one runs
+        # a list from Windows with blank lines and a column of notes; a row that is wrong is found before the first one runs
         write(os.path.join(self.work, "odd.nml"), case)
-        write(os.path.join(self.work, "odd.csv"), "mu\r\n0.1\r\n \r\n\r\n")
-        self.assertEqual(self.sh("gravier_job", "--list", "odd.csv", "odd.nml").returncode, 0)
+        write(os.path.join(self.work, "odd.csv"), "label,mu\r\nfirst of all,0.1\r\n \r\n\r\n")
+        done = self.sh("gravier_job", "--list", "odd.csv", "odd.nml")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
         write(os.path.join(self.work, "late.nml"), case)
         write(os.path.join(self.work, "late.csv"), "mu\n0.1\n0.2,0.3\n")
         done = self.sh("gravier_job", "--list", "late.csv", "late.nml")

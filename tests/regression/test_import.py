@@ -774,6 +774,13 @@ class Import(RunTestCase):
         folder, message = self.convert(box, status=2)
         self.assertRegex(message, r"^gravier_import: error: case.nml: gravier --check refuses the case that was made: .*overlap.*\n$")
         self.assertEqual(os.listdir(folder), [])
+        # a program that cannot run says why, and has refused nothing
+        broken = write(self.here("broken.sh"), "#!/bin/sh\necho 'orted: no free slots' >&2\necho 'MPI_Init failed' >&2\nexit 77\n")
+        os.chmod(broken, 0o755)
+        folder, message = self.convert(box, status=2, GRAVIER_PROGRAM=broken)
+        self.assertEqual(message, f"orted: no free slots\nMPI_Init failed\ngravier_import: error: case.nml: {broken} --check ended with status 77, without a word on the case "
+                                  "that was made; expected a program gravier that runs, or none in the place of this one, with which the case is not checked\n")
+        self.assertEqual(os.listdir(folder), [])
         folder, notes = self.convert(box, GRAVIER_PROGRAM="no_such_program")
         self.assertIn("case.nml is not checked; see gravier --check case.nml", notes)
         self.assertEqual(sorted(os.listdir(folder)), ["case.h5", "case.nml"])

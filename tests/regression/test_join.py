@@ -47,6 +47,7 @@ class Tables(RunTestCase):
                 np.testing.assert_array_equal(walls[name], known.boundaries()[name], err_msg=name)
         with open(path, encoding="ascii") as file:
             text = file.read()
+        np.testing.assert_array_equal(BodiesTable(write(self.here("remark.csv"), "# größe\n" + text.partition("\n")[2])).bodies().radius, bodies.radius)
         write(path, text.replace("0.25,0.1", "0.35,0.1"))
         with self.assertRaisesRegex(gravier.ResultsError, "checksum in its first line is not that of what it holds"):
             BodiesTable(path)
@@ -57,7 +58,7 @@ class Tables(RunTestCase):
                             ("id,x,y,radius\n1.5,0,0,0.1\n", "line 2: id '1.5'; expected an integer"), ("id,x,y,radius\n1,0,0,\n", "line 2: radius ''; expected a number"),
                             ("id,x,y,radius\n1,0,0,-1\n", "line 2: radius -1; expected a number above 0"), ("id,x,y,radius\n1,inf,0,1\n", "x 'inf'; expected a number"),
                             ("id,x,y,radius\n", "no body"), ("\n# nothing\n", "no row"), ("id,x,y,radius,shape\n1,0,0,1,die\n", "shape die; expected grain or plane"),
-                            ("id,x,y,radius,shape,nx,ny\n1,0,0,1,,,\n2,0,0,,plane,0,0\n", "line 3: a normal of 0"), ("id,x,y,radius\n1,é,0,1\n", "not of ASCII")):
+                            ("id,x,y,radius,shape,nx,ny\n1,0,0,1,,,\n2,0,0,,plane,0,0\n", "line 3: a normal of 0"), ("id,x,y,radius\n1,é,0,1\n", "line 2: x 'é'; expected a number")):
             with self.subTest(text=text), self.assertRaisesRegex(gravier.ResultsError, words):
                 table = BodiesTable(write(self.here("bad.csv"), text))
                 self.assertIsNotNone((table.bodies(), table.boundaries()))

@@ -1,5 +1,6 @@
 """Measures of states: mixing, heaps and tests between walls, of states whose values are known, with single grains astray, and of runs."""
 import os
+import re
 import sys
 import unittest
 
@@ -9,7 +10,9 @@ import numpy as np
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
-from gravier.mixing import lacey
+from gravier.linked_grains import components, near_pairs
+from gravier.mixing import lacey, split_radius
+from gravier.wall_tests import sine_of_means
 
 matplotlib.use("Agg")
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
@@ -21,11 +24,11 @@ R = 0.01
 class States(gravier.Run):
     """States of grains as a run has them: positions, and radii R unless told."""
 
-    def __init__(self, *states, radius=None, period=None):
+    def __init__(self, *states, radius=None, period=None, walls=()):
         self.path, self.dimension = "states", len(states[0][0])
         self.period = np.zeros(self.dimension) if period is None else np.array(period)
         self.steps, self.times = np.arange(len(states)), 0.1 * np.arange(len(states))
-        self.case = {"material": [{"name": "sand"}, {"name": "steel"}]}
+        self.case, self.walls = {"material": [{"name": "sand"}, {"name": "steel"}], "boundary": [{"name": "gate", "remove_at": 0.1}]}, walls
         self.states = [gravier.Table(id=np.arange(1, len(state) + 1), position=np.array(state, dtype=float),
                                      radius=np.full(len(state), R) if radius is None else np.resize(radius, len(state))) for state in states]
 
@@ -34,6 +37,10 @@ class States(gravier.Run):
 
     def shapes(self):
         return []
+
+    def boundaries(self, step=None):
+        names, places, normals = zip(*self.walls) if self.walls else ((), (), ())
+        return gravier.Table(name=np.array(names), shape=np.full(len(names), "plane"), position=np.array(places), normal=np.array(normals))
 
 
 def grid(*counts):
@@ -85,6 +92,14 @@ class Mixing(unittest.TestCase):
         for value in (None, 2, "2", "steel"):
             self.assertEqual(gravier.mixing(run, by="material", value=value).segregation[0], table.segregation[0])
         self.assertAlmostEqual(gravier.mixing(run, by="material", value="sand").segregation[0], 1.0, places=12)
+
+    def test_one_range_of_sizes(self):
+        """The radius that divides sizes is known, and so is whether it divides two kinds or one range."""
+        bed = grid(20, 20)
+        for radius, value, known in ((np.linspace(1.0, 2.0, 400), None, (1.5, True)), (np.linspace(1.0, 2.0, 400), 1.2, (1.2, True)),
+                                     (np.repeat([1.0, 2.0], 200), None, (1.5, False)), (np.concatenate([np.linspace(1.0, 1.2, 200), np.linspace(1.8, 2.0, 200)]), None, (1.5, False)),
+                                     (np.repeat([1.0, 1.5, 2.0], [100, 100, 200]), None, (1.5, False)), (np.ones(400), 5.0, (5.0, False))):
+            self.assertEqual(split_radius(States(bed, radius=radius), value), known)
 
     def test_stray_grain(self):
         """One grain of 400 that flies away changes nothing that matters."""
@@ -181,8 +196,85 @@ class Heaps(unittest.TestCase):
             np.testing.assert_allclose([found.angle_low[0], found.angle_high[0]], 25.0, atol=1.5)
             np.testing.assert_allclose([-found.front_low[0], found.front_high[0]], np.abs(flat[:, 0]).max(), atol=3.0 * R)
 
+    def test_thin_front(self):
+        """Below the foot of a wedge a row of grains with holes of 0.4 diameters belongs to the heap, and what lies 0.6 diameters away does not: neither the end
+        of the heap nor its run-out depends on the width of columns."""
+        place, radius = wedge(25.0, 1.2), 1.3 * R
+        foot = place[:, 0].max()
+        row = np.stack([foot + 2.8 * R * np.arange(1, 21), np.full(20, R)], axis=1)
+        beyond = [[row[-1, 0] + 3.2 * R + 2.0 * R * k, R] for k in range(5)]
+        run = States(grid(20, 60), np.concatenate([place[place[:, 0] > 0.0], row, beyond, ASTRAY]))
+        for width in (0.5 * R, 2.0 * R, 4.0 * R, 8.0 * R):
+            found = gravier.heap(run, width=width)
+            np.testing.assert_allclose(found.front_high, [40.0 * R, row[-1, 0] + R], rtol=1e-12)
+            self.assertAlmostEqual(found.run_out[1], found.length[1] / (40.0 * R) - 1.0, places=12)
+        # of two sizes the gap is that of surfaces
+        run = States(np.array([[radius, radius], [2.0 * radius + R, R], [2.0 * radius + 4.0 * R, R], [2.0 * radius + 7.5 * R, R]]), radius=[radius, R, R, R])
+        self.assertAlmostEqual(gravier.heap(run).front_high[0], 2.0 * radius + 5.0 * R, places=12)
+
+    def test_near_pairs(self):
+        """Pairs of balls of many sizes within a gap, and what hangs together by them, are those of all pairs, in the plane and in space, with one ball far away."""
+        rng = np.random.default_rng(5)
+        for dimension, spread, gap in ((2, 0.0, 0.0), (2, 3.0, 0.01), (3, 0.5, 0.02), (3, 3.0, 0.0)):
+            place, radius = rng.uniform(0.0, 1.0, (200, dimension)), 0.01 * np.exp(rng.uniform(0.0, spread, 200))
+            place[7] = 1e9
+            away = np.linalg.norm(place[:, None] - place[None], axis=2) - radius[:, None] - radius[None]
+            known = (away <= gap) & ~np.eye(200, dtype=bool)
+            found = np.zeros_like(known)
+            i, j = near_pairs(place, radius, gap)
+            found[i, j] = found[j, i] = True
+            np.testing.assert_array_equal(found, known)
+            reach = known | np.eye(200, dtype=bool)
+            for _ in range(8):
+                reach = reach.astype(float) @ reach > 0.0
+            np.testing.assert_array_equal(components(200, i, j), reach.argmax(axis=1))
+
+    def test_rods(self):
+        """Rods that lie end to end hang together, though balls of their volume are far apart."""
+        run = States(R * np.stack([1.0 + 2.2 * np.arange(10), np.ones(10)], axis=1))
+        run.volumes = lambda bodies: 0.2 * np.pi * bodies.radius**2
+        found = gravier.heap(run)
+        self.assertAlmostEqual(found.front_high[0], (1.0 + 2.2 * 9 + np.sqrt(0.2)) * R, places=12)
+
+    def test_end_across(self):
+        """In space the end is a mean over the breadth of a channel, or over the rim of a round heap; grains hang together across a period too."""
+        bed = grid(10, 20, 2)
+        bed = bed[(bed[:, 0] < 10.0 * R) | (bed[:, 1] < 20.0 * R)]
+        self.assertAlmostEqual(gravier.heap(States(bed), along="x").front_high[0], 15.0 * R, delta=R)
+        # a row along y that only its image across the period links to the bed
+        row = np.array([[20.0 * R + 0.01 * R, 39.99 * R + 2.5 * R, R], [22.0 * R, 39.99 * R + 2.5 * R, R]])
+        for period, end in (([0.0, 42.5 * R, 0.0], 23.0 * R), (None, 20.0 * R)):
+            found = gravier.heap(States(np.concatenate([grid(10, 20, 1), row]), period=period), along="x")
+            self.assertLessEqual(found.front_high[0], end)
+            self.assertEqual(found.front_high[0] > 20.0 * R, period is not None)
+        disk = grid(60, 60, 1)
+        disk = disk[np.hypot(disk[:, 0] - 60.0 * R, disk[:, 1] - 60.0 * R) < 40.0 * R]
+        spoke = np.array([[100.0 * R + 2.0 * R * k, 60.0 * R, R] for k in range(1, 16)])
+        round_one = gravier.heap(States(disk, np.concatenate([disk, spoke])))
+        self.assertAlmostEqual(round_one.length[0], 40.0 * R, delta=1.5 * R)
+        self.assertLess(round_one.length[1] - round_one.length[0], 2.0 * R)
+
+    def test_channels_are_not_round(self):
+        """A heap that fills a period, or the breadth between two walls, along one axis is refused as round; one in the middle of them is not, nor is a bed
+        that fills both, or one beside a gate that is removed."""
+        flat = wedge(25.0, 0.6)
+        channel = np.concatenate([np.insert(flat, 1, y, axis=1) for y in R * (2.0 * np.arange(4) + 1.0)])
+        cone = wedge(30.0, 0.5, 3)
+        sides = [("a", [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]), ("b", [0.0, 8.0 * R, 0.0], [0.0, -1.0, 0.0])]
+        for run, words in ((States(channel, period=[0.0, 8.0 * R, 0.0]), "the period along y, so that the heap is not round; expected --along x"),
+                           (States(channel, walls=sides), "the breadth between two walls along y, .* expected --along x"),
+                           (States(channel[:, [1, 0, 2]], period=[8.0 * R, 0.0, 0.0]), "the period along x, .* expected --along y"),
+                           (States(cone, channel, period=[0.0, 8.0 * R, 0.0]), "expected --along x")):
+            with self.assertRaisesRegex(gravier.ResultsError, words):
+                gravier.heap(run)
+        for run in (States(cone, period=[0.0, 4.0, 0.0]), States(grid(4, 4, 2), period=[8.0 * R, 8.0 * R, 0.0]), States(channel, walls=sides[:1]),
+                    States(channel, walls=[sides[0], ("gate", *sides[1][1:])])):
+            self.assertIn("angle", gravier.heap(run))
+
     def test_refusals(self):
         run = States(grid(3, 3))
+        with self.assertRaisesRegex(gravier.ResultsError, r"floor 5: above all grains of all states; expected the height of the floor"):
+            gravier.heap(run, floor=5.0)
         for words, options in (("along 'y': expected x", {"along": "y"}), ("shares 0.8 and 0.2", {"shares": (0.8, 0.2)}), ("width 0: expected", {"width": 0.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.heap(run, **options)
@@ -192,9 +284,30 @@ class Heaps(unittest.TestCase):
             gravier.heap(empty)
 
 
+class Sheared(States):
+    """A periodic cell with a grain, whose stress turns from step to step."""
+
+    directory = "states"
+
+    def __init__(self, principal, angles):
+        """Principal stresses, and the angles by which their axes are turned in the plane of x and the last axis."""
+        super().__init__(np.full((1, len(principal)), 1.0), period=np.full(len(principal), 1.0))
+        axes, last = "xyz"[:len(principal)], len(principal) - 1
+        columns = {"step": np.arange(1.0, len(angles) + 1), "time": 0.1 * np.arange(1, len(angles) + 1), "grains": np.ones(len(angles))}
+        turn = np.array([np.eye(len(principal))] * len(angles))
+        turn[:, 0, 0] = turn[:, last, last] = np.cos(angles)
+        turn[:, 0, last], turn[:, last, 0] = -np.sin(angles), np.sin(angles)
+        stress = turn @ np.diag(principal) @ turn.transpose(0, 2, 1)
+        columns.update({f"stress_{a}{b}": stress[:, i, j] for i, a in enumerate(axes) for j, b in enumerate(axes)})
+        self.columns = columns
+
+    def history(self):
+        return gravier.Table(self.columns)
+
+
 class WallTests(RunTestCase):
 
-    def squeezed(self, name, dimension=2, boundaries=None, more=None):
+    def squeezed(self, name, dimension=2, boundaries=None, more=None, steps=20, law=None):
         """A grain between planes that forces press together, or those that are given."""
         os.makedirs(self.here(name))
         axes = "xyz"[:dimension]
@@ -205,8 +318,10 @@ class WallTests(RunTestCase):
                                   "free": [bool(entry) for entry in unit[k]], "pressure": pressure, "mass": 1.0}
                                  for k, (axis, pressure) in enumerate(zip(axes, (1000.0, 2000.0, 3000.0)))]
         output = {"directory": ".", "every": 1000, "boundary_forces": True, **(more or {})}
-        run = run_case({"scene": {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "file", "bodies_file": "one.csv"}, "boundary": planes,
-                        "time": {"step": 1e-3, "steps": 20}, "solver": {"accuracy": 1e-6}, "output": output}, 1, self.here(name))
+        laws = {"material": {"name": "sand"}, "law": {"materials": "sand", **law}} if law else {}
+        scene = {"dimension": dimension, "gravity": [0.0] * 3, "bodies": "file", "bodies_file": "one.csv", **({"wall_material": "sand"} if law else {})}
+        run = run_case({"scene": scene, **laws, "boundary": planes,
+                        "time": {"step": 1e-3, "steps": steps}, "solver": {"accuracy": 1e-6}, "output": output}, 1, self.here(name))
         self.assert_status(run, 0)
         return gravier.Run(self.here(name))
 
@@ -225,6 +340,38 @@ class WallTests(RunTestCase):
         for options, ratio in (({}, 2.0), ({"lateral": "x"}, 3.0), ({"lateral": ["y"]}, 1.5), ({"axial": "x"}, 0.4)):
             self.assertAlmostEqual(gravier.wall_test(run, **options).stress_ratio[-1], ratio, places=6)
         self.assertAlmostEqual(gravier.wall_test(run).solid_fraction[-1], np.pi / 6.0, places=6)
+
+    def test_principal_stresses(self):
+        """sin phi is that of the principal stresses, whatever their axes; of means it is that of the mean stresses."""
+        for principal in ((300.0, 100.0), (300.0, 250.0, 100.0), (100.0, 150.0, 300.0)):
+            angles = np.radians([0.0, 20.0, 45.0, 90.0, 45.0, 45.0])
+            run = Sheared(principal, angles)
+            found = gravier.wall_test(run)
+            np.testing.assert_allclose(found.sin_phi, 0.5, rtol=1e-12)
+            # along the axes there is nothing to see at 45 degrees
+            np.testing.assert_allclose(found.axial_stress[2], 200.0)
+            # turned by 45 and 90 degrees: 2 cos 45 degrees of shear and difference are left of 2
+            self.assertAlmostEqual(gravier.wall_test(run, mean=2).sin_phi[1], 0.5 * np.sqrt(0.5), places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 1), 2), gravier.wall_test(run, mean=4, since=0.25).sin_phi[0], places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 2), 1), gravier.wall_test(run, mean=4, since=0.25).sin_phi[0], places=12)
+            self.assertAlmostEqual(sine_of_means(run, (None, None, 1), 0), gravier.wall_test(run, mean=6).sin_phi[0], places=12)
+
+    def test_way_through_air(self):
+        """A lid that is 0.8 radii above the grain and comes down at 0.1 m/s bears nothing for 80 steps of 1 ms; the command says when and how much strain this is."""
+        walls = [{"name": "side", "shape": "plane", "point": [2.0 * R, 0.0], "normal": [-1.0, 0.0]},
+                 {"name": "lid", "shape": "plane", "point": [0.0, 2.8 * R], "normal": [0.0, -1.0], "velocity": [0.0, -0.1]}]
+        self.squeezed("air", boundaries=walls, more={"stress": True}, steps=81, law={"kind": "elastic", "normal_stiffness": 1e6})
+        measured = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "walls", "air", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual((measured.returncode, measured.stderr), (0, ""))
+        found = re.search(r"\nlid bears nothing before (\S+) s, and strains count (\S+) for its way until then; --since \1 leaves it out\n", measured.stdout)
+        self.assertTrue(found, measured.stdout)
+        # the floor, which does not move, bears nothing either
+        self.assertEqual(measured.stdout.count("bears nothing"), 1)
+        self.assertAlmostEqual(float(found[1]), 0.08, delta=0.0015)
+        self.assertAlmostEqual(float(found[2]), 0.1 * 0.079 / (2.8 * R), delta=0.006)
+        later = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "walls", "air", "--since", found[1], directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual(later.returncode, 0, later.stderr)
+        self.assertNotIn("bears nothing", later.stdout)
 
     def test_strains(self):
         """A lid that comes down at 0.1 m/s and a side that goes out at 0.05 m/s: strains are those of their ways since the end of a step; old walls that
@@ -301,7 +448,7 @@ class Command(RunTestCase):
         self.assertRegex(done.stdout, r"^last row: time 0\.8 s, height 0\.\d+ m, front low .*, run out \d.*\nresults/heap\.csv\n$")
         found, known = (gravier.read_table(os.path.join(self.directory, "results/heap.csv")),
                         gravier.heap(gravier.Run(os.path.join(self.directory, "results")), since=0.05))
-        self.assertEqual(list(found), list(known))
+        self.assertEqual(list(found), [*known, "run_checksum"])
         for name in known:
             np.testing.assert_allclose(found[name], known[name], rtol=1e-8)
         self.assertEqual(found.step.tolist(), list(range(50, 801, 50)))
@@ -310,7 +457,7 @@ class Command(RunTestCase):
         self.assertLess(found.height[-1], 0.6 * found.height[0])
         self.assertTrue(5.0 < found.angle_high[-1] < 40.0, found.angle_high[-1])
         done = self.measure("mixing", "results", "--cell", "0.05", "--out", "sizes.csv")
-        self.assertEqual((done.returncode, done.stdout.splitlines()[-1]), (0, "sizes.csv"), done.stderr)
+        self.assertEqual((done.returncode, done.stdout.splitlines()[1:]), (0, ["the first kind has radii above 0.012 m", "sizes.csv"]), done.stderr)
         sizes = gravier.read_table(os.path.join(self.directory, "sizes.csv"))
         np.testing.assert_allclose(sizes.share, 12 / 87)
         self.assertAlmostEqual(sizes.segregation[0], -1.0, places=6)
@@ -373,7 +520,7 @@ class Command(RunTestCase):
                                  (["heap", "results", "--out", "results/history.csv"], "history.csv: there is a file of another kind or origin"),
                                  (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
                                  (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
-                                 (["mixing", "results", "--by", "material"], "material None; expected one of"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
+                                 (["mixing", "results", "--by", "material"], "results.h5: no second material; expected one of none, the case has no &material"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
                                  (["walls", "results", "--mean", "0"], "expected an integer >= 1"),
                                  (["outflow", "results"], "no column left_mass; expected a run with a boundary of shape outlet"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
             with self.subTest(arguments=arguments):

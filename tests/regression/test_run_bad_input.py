@@ -279,7 +279,9 @@ TABLES = [
     ("pressure across the free axis", "time,pressure\n0,1\n", FREE_X,
      ("column pressure", "no such column but for a plane of which a component along normal is free")),
     ("pressure where nothing is free", "time,pressure\n0,1\n", {}, ("column pressure", "no such column but for a plane")),
-    ("speed", "time,vx\n0,0\n1,1e300\n", {}, ("table.csv", "line 3", "column vx", '"1e300"', "a number of at most 1e30 in size")),
+    ("speed", "time,vx\n0,0\n1,1e300\n", {}, ("table.csv: table of boundary 'boundary 1': line 3: column vx", '"1e300"', "a number of at most 1e30 in size")),
+    ("no number", "time,vx\n0,0\n1,abc\n", {}, ("table.csv: table of boundary 'boundary 1': line 3: column vx: \"abc\"",)),
+    ("unknown column", "time,speed\n0,0\n", {}, ("table.csv: table of boundary 'boundary 1': column speed is unknown here",)),
     ("time", "time,vx\n0,0\n1e300,1\n", {}, ("table.csv", "line 3", "column time", '"1e300"', "a number of at most 1e30 in size")),
 ]
 

@@ -1,14 +1,16 @@
 """What Run.verdict and gravier_report say of a run that was restarted: the words of all its starts count, not those of the last one alone."""
+import csv
 import os
 import re
+import subprocess
 import sys
 import unittest
 
 import h5py
-from gravier_runs import SOURCE, RunTestCase, gravier, merged, namelist, run_case
+from gravier_runs import ENVIRONMENT, PATIENCE, PROGRAMS, SOURCE, RunTestCase, gravier, merged, namelist, run_case, write
 
-from gravier import Run
-from gravier.run_words import convergence, verdict
+from gravier import Run, study
+from gravier.run_words import convergence, doubts, verdict
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/report"))
 from run_log import RunLog  # noqa: E402
@@ -35,6 +37,44 @@ class Verdict(RunTestCase):
             self.assertEqual(verdict(text), said, text)
         self.assertEqual(convergence(MISSED + NONE), "NO: 3 of 9 solves did not reach the accuracy")
         self.assertEqual(converged(RunLog(REFUTED + NONE), {}).grade, BAD)
+
+    def test_doubts(self):
+        """What the last words say behind their begin are doubts, of all starts, but for projections of little account; a directory may have any name."""
+        begin, end = f"{HEAD}converged   yes: every solve reached the accuracy\nfinished    all 60 steps reached the accuracy", "; results in a; b, but c\n"
+        for words, told in (("", ""), ("; 330 times something moved too far for the step", "330 times something moved too far for the step"),
+                            ("; overlaps were projected in 98 % of them: the results are not those of the contact law; overlaps came to 2.06 of the mean radius",
+                             "overlaps were projected in 98 % of the steps: the results are not those of the contact law; overlaps came to 2.06 of the mean radius"),
+                            ("; overlaps were projected in 98 % of them, by 0.3 % of the paths of grains; errors and overlaps are those since the restart", ""),
+                            (", but velocities were wrong by up to 5.29 times the velocity scale U in 20 of them; 3 grains had fallen below all boundaries",
+                             "velocities were wrong by up to 5.29 times the velocity scale U in 20 of the steps; 3 grains had fallen below all boundaries")):
+            said = "converged with doubts" if told else "converged"
+            self.assertEqual((doubts(begin + words + end), verdict(begin + words + end)), (told, said))
+            self.assertEqual((doubts(begin + words + end + NONE), verdict(begin + words + end + YES)), (told, said))
+            self.assertEqual(doubts(2 * (begin + words + end)), told)
+        self.assertEqual(doubts(MISSED), "")
+        # a start that was interrupted has no last words
+        for share, way, depth, told in ((59, "1.3E-01", "2.1E+00", "overlaps were projected in 98 % of the 60 steps before an interruption: the results are not those of the contact law; "
+                                         "overlaps came to 2.1 of the mean radius"), (6, "1.3E-01", "1.0E-01", ""), (59, "9.9E-03", "1.1E-01", "overlaps came to 0.11 of the mean radius")):
+            part = (f"{HEAD}overlaps    in the first step at most 0.00E+00 m, later at most 1.03E-02 m, {depth} of the mean radius\n            projected in {share} of 60 steps (98 %): "
+                    f"shifts of a grain add up to 6.78E-03 m on average, {way} of its path of 5.22E-02 m\n")
+            self.assertEqual(doubts(f"{part}interrupted *** at the walltime\n{YES}"), told)
+            self.assertEqual(doubts(f"{part}finished    all 60 steps reached the accuracy; results in out\n"), "")
+
+    def test_step_that_is_too_long(self):
+        """Grains that fall by more than their radius in a step: the verdict, the table of a study and gravier_job tell of it, though each solve has converged."""
+        case = {"scene": {"bodies": "lattice", "lattice_count": [10, 10], "radius_min": 0.004, "radius_max": 0.006, "friction": 0.3},
+                "time": {"step": 2e-2, "steps": 60}, "output": {"directory": "big", "every": 10}}
+        (_, place, status), = study(case, {("scene", "seed"): [1]}, self.here("study"))
+        run = Run(place / "big")
+        self.assertEqual((status, run.verdict()), (0, "converged with doubts"))
+        self.assertRegex(run.doubts(), r"^overlaps were projected in \d+ % of the steps: the results are not those of the contact law; .*; \d+ times something moved too far for the step$")
+        with open(self.here("study/study.csv"), newline="", encoding="utf-8") as file:
+            row, = csv.DictReader(file)
+        self.assertEqual((row["status"], row["steps_missed"], row["doubts"]), ("0", "0", run.doubts()))
+        write(self.here("big.nml"), namelist(case))
+        done = subprocess.run(["sh", os.path.join(SOURCE, "drivers/jobs/gravier_job"), "big.nml"], cwd=self.scratch, capture_output=True, text=True, timeout=PATIENCE,
+                              check=False, env={**os.environ, **ENVIRONMENT, "PATH": f"{PROGRAMS}:{os.environ['PATH']}", "GRAVIER_LAUNCH": "env"})
+        self.assertEqual((done.returncode, done.stderr), (0, f"gravier_job: big: the results are in doubt: {run.doubts()}\n"))
 
     def test_no_step_left(self):
         """A run that did not converge has not converged after a restart that had no step left to make."""

@@ -77,7 +77,7 @@ class Study(RunTestCase):
             self.assertEqual((point, status), ({("time", "steps"): 2}, 0), place)
         with self.assertRaisesRegex(gravier.CaseError, "status 2: gravier: error: case.nml: &scene friction = -1"):
             list(gravier.study(base, {("scene", "friction"): [-1.0], ("output", "directory"): ["results"]}, self.here("refused")))
-        self.assertEqual(pathlib.Path(self.here("refused/study.csv")).read_text(), "run,status,scene.friction,output.directory,steps_missed,worst_error\n")
+        self.assertEqual(pathlib.Path(self.here("refused/study.csv")).read_text(), "run,status,scene.friction,output.directory,steps_missed,worst_error,doubts\n")
         # one of several groups, by its name or its number
         several = {**base, "boundary": [{**GROUND, "name": "ground"}, {**GROUND, "name": "lower", "point": [0.0, -1.0]}]}
         for which in ("lower", 2):
@@ -106,7 +106,7 @@ class Study(RunTestCase):
             return figures if run.case["solver"][0]["max_iterations"] == 10000 else dict(reversed(list(figures.items())))
         found = list(gravier.study(base, changes, self.here("measured"), results=measured))
         header, *rows = csv_rows(self.here("measured/study.csv"))
-        self.assertEqual(header, ["run", "status", "solver.max_iterations", "solver.on_failure", "steps_missed", "worst_error", "height", "last", "says"])
+        self.assertEqual(header, ["run", "status", "solver.max_iterations", "solver.on_failure", "steps_missed", "worst_error", "doubts", "height", "last", "says"])
         for row, (point, place, status) in zip(rows, found):
             row, run = dict(zip(header, row)), gravier.Run(place / "out")
             history = run.history()
@@ -127,7 +127,7 @@ class Study(RunTestCase):
         # a run without steps has no velocity error
         for _ in gravier.study({**base, "time": {"step": 1e-3, "steps": 0}}, {("scene", "seed"): [1]}, self.here("still")):
             pass
-        self.assertEqual(csv_rows(self.here("still/study.csv"))[1], ["run_1", "0", "1", "", ""])
+        self.assertEqual(csv_rows(self.here("still/study.csv"))[1], ["run_1", "0", "1", "", "", ""])
         for results, words in ((lambda run: 3.0, "results of run_1: 3.0; expected a dictionary of values by the names of their columns"),
                                (lambda run: {"status": 1}, "results of run_1: status: study.csv has a column of this name; expected another one"),
                                (lambda run: {"worst_error": 1}, "results of run_1: worst_error: study.csv has a column"),

@@ -43,11 +43,10 @@ class BodiesTable:
         try:
             with open(self.path, "rb") as file:
                 text = file.read()
-            lines = text.decode("ascii").splitlines()
+            # comments may have any letters
+            lines = text.decode(errors="replace").splitlines()
         except OSError as reason:
             raise ResultsError(f"{self.path}: {reason.strerror}; expected a bodies file") from None
-        except ValueError:
-            raise ResultsError(f"{self.path}: a character that is not of ASCII; expected a table of bodies") from None
         if not sealed_as(text):
             raise ResultsError(f"{self.path}: the checksum in its first line is not that of what it holds: the file is damaged, or was changed since it was sealed")
         rows = [(number, next(csv.reader([line]))) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]

@@ -1,29 +1,34 @@
 """Where a heap or a collapsed column ends, how high it is, and the slopes of its flanks."""
 import numpy as np
 
+from .linked_grains import components, near_pairs
 from .mixing import free_grains, states_since
 from .shapes import ball
 from .tables import ResultsError, Table
+from .wall_tests import ALONG
 
 #: grains below this share, by number, may lie under the floor
 LOWEST = 0.01
-#: part of a full row of grains above which it belongs to a heap
-FULL = 0.75
+#: gap up to which grains hang together, in mean diameters; breadth of the strips, or sectors at the rim, over which an end in space is a mean
+LINK, STRIP = 0.5, 2.0
+#: part of the breadth between walls, or of a period, from which on grains fill it
+FILLED = 0.75
 #: a flank has at least so many columns
 FEWEST = 3
-#: places of the first bin in which an end is looked for; places of the columns, over which slopes are means
-PLACES, SHIFTS = 20, 4
+#: places of the columns, over which slopes are means
+SHIFTS = 4
 
 
 def heap(run, along=None, shares=(0.1, 0.9), width=None, floor=None, since=0.0):
     """Size and slopes of a heap in each written state of a run, a row a state: step, time, height [m], front_low, front_high [m], length [m],
     run_out, angle_low, angle_high [degrees]; of a round heap in space height, length, the radius, run_out and angle.
 
-    In space `along` is the axis "x" or "y" of a heap in a channel; without it the heap is round. Heights are those of columns of edge `width` [m], two
-    mean diameters unless told, above `floor` [m], by default the lowest grains. The slope of a flank is that of the line of least squares through the
-    columns between the `shares` of the height; a flank of fewer than three such columns has NaN. run_out is length over that of the first state with
-    grains, less 1; states before the time `since` [s] are left out. Single grains away from the others do not count. doc/measures.md has the
-    definitions."""
+    In space `along` is the axis "x" or "y" of a heap in a channel; without it the heap is round, and one that fills a channel is refused. The heap ends
+    with the last grain that hangs together with it, over gaps of at most half a mean diameter; in space this is a mean over its breadth or its rim. Heights are
+    those of columns of edge `width` [m], two mean diameters unless told, above `floor` [m], by default the lowest grains. The slope of a flank is that of the
+    line of least squares through the columns between the `shares` of the height; a flank of fewer than three such columns has NaN. run_out is length over
+    that of the first state with grains, less 1; states before the time `since` [s] are left out. Single grains away from the others do not count.
+    doc/measures.md has the definitions."""
     round_one = _is_round(run, along)
     low, high = shares
     if not 0.0 <= low < high <= 1.0:
@@ -32,6 +37,8 @@ def heap(run, along=None, shares=(0.1, 0.9), width=None, floor=None, since=0.0):
         raise ResultsError(f"width {width:g}: expected a length above 0")
     names = ("height", "length", "angle") if round_one else ("height", "front_low", "front_high", "length", "angle_low", "angle_high")
     states, rows = states_since(run, since), []
+    if round_one:
+        _check_round(run, [step for step, _ in states])
     for step, _ in states:
         bodies = free_grains(run, step)
         found = _measure(run, bodies, along, (width, floor, shares)) if len(bodies) else (np.nan,) * len(names)
@@ -40,24 +47,36 @@ def heap(run, along=None, shares=(0.1, 0.9), width=None, floor=None, since=0.0):
     known = table.length[np.isfinite(table.length)]
     if len(known) == 0:
         raise ResultsError(f"{run.path}: no written state has grains; expected a heap")
+    if floor is not None and not np.any(table.height > 0.0):
+        raise ResultsError(f"{run.path}: floor {floor:g}: above all grains of all states; expected the height of the floor [m]")
     table["run_out"] = table.length / known[0] - 1.0
     order = [*names[:names.index("length") + 1], "run_out", *names[names.index("length") + 1:]]
     return Table({"step": np.array([step for step, _ in states]), "time": np.array([time for _, time in states]), **{name: table[name] for name in order}})
 
 
-def ends(place, volume, ground, layer, bins):
-    """Where a layer of grains ends that begins at 0: from each of the first bins on the first bin whose grains, over its ground, are thinner than
-    `layer` [m], its lower end. `place` (n) are distances from the beginning [m], `volume` (n) those of grains, `ground` gives area or length
-    between 0 and a distance, `bins` the width of bins, the number of places of the first bin and the place from which bins count [m]."""
-    wide, places, inner = bins
-    found = []
-    for first in np.arange(places) / places * wide:
-        # one of more bins than grains is empty, however far away a grain is
-        edges = np.arange(first, min(place.max(initial=0.0) + 3.0 * wide, first + (len(place) + 5) * wide), wide)
-        thickness = np.histogram(place, edges, weights=volume)[0] / np.diff(ground(edges))
-        thickness[edges[:-1] < inner] = np.inf
-        found.append(edges[np.flatnonzero(thickness < layer)[0]])
-    return np.array(found)
+def heap_of(position, size, gap, images=()):
+    """The rows of the grains of the heap: of the balls of radius `size` that hang together over gaps of at most `gap` [m] the ones of most volume. `images` are ways to
+    images of a channel that is periodic."""
+    places, sizes, rows = [position], [size], [np.arange(len(position))]
+    for way in images:
+        # images of what is near the lower side, at the upper one
+        across = position @ way / np.dot(way, way)
+        near = np.flatnonzero((across - across.min()) * np.linalg.norm(way) < 2.0 * size.max() + gap)
+        places, sizes, rows = [*places, position[near] + way], [*sizes, size[near]], [*rows, near]
+    rows = np.concatenate(rows)
+    label = components(len(position), *(rows[pair] for pair in near_pairs(np.concatenate(places), np.concatenate(sizes), gap)))
+    return np.flatnonzero(label == np.bincount(label, size**position.shape[1]).argmax())
+
+
+def end(place, size, beside, strip):
+    """Where the grains of a heap end that begins at 0: the mean over strips of their farthest surface. `place` (n) are distances from the beginning
+    [m], `size` (n) radii, `beside` (n) where they are across, `strip` the breadth of strips; 0 for one of all."""
+    low, breadth = beside.min(), np.ptp(beside)
+    number = max(1, int(breadth / strip)) if strip > 0.0 else 1
+    row = np.minimum((beside - low) / max(breadth, 1e-300) * number, number - 1).astype(int)
+    farthest = np.full(number, -np.inf)
+    np.maximum.at(farthest, row, place + size)
+    return farthest[np.isfinite(farthest)].mean()
 
 
 def columns(position, size, width, floor):
@@ -95,30 +114,67 @@ def _is_round(run, along):
     return run.dimension == 3 and along is None
 
 
+def _check_round(run, steps):
+    """Refuse a heap as round that fills the period, or the breadth between two walls, along one horizontal axis and not along the other one."""
+    sides = [_sides(run, axis) for axis in (0, 1)]
+    for step in (steps[0], steps[-1]):
+        bodies = free_grains(run, step)
+        if len(bodies) == 0:
+            continue
+        mean = _sizes(run, bodies).mean()
+        filled = [breadth > 0.0 and _breadth(bodies.position[:, axis], mean) > FILLED * breadth for axis, (breadth, _) in enumerate(sides)]
+        if sum(filled) == 1:
+            axis = filled.index(True)
+            raise ResultsError(f"{run.path}: the grains fill {sides[axis][1]}, so that the heap is not round; expected --along {'xy'[1 - axis]}, along=\"{'xy'[1 - axis]}\" "
+                               "in Python")
+
+
+def _sides(run, axis):
+    """The period, or else the distance of two walls, along an axis, 0 without either [m]; and what it is, in words."""
+    name = "xyz"[axis]
+    if run.period[axis] > 0.0:
+        return run.period[axis], f"the period along {name}"
+    rows, facing = run.boundaries(run.steps[0]), {}
+    removed = [group.get("name") for group in run.case.get("boundary", []) if "remove_at" in group]
+    for title, shape, normal, place in zip(rows.name, rows.shape, rows.normal, rows.position):
+        if shape in ("plane", "rectangle") and title not in removed and abs(normal[axis]) > ALONG:
+            facing.setdefault(normal[axis] > 0.0, []).append(place[axis])
+    if len(facing) < 2:
+        return 0.0, ""
+    return min(facing[False]) - max(facing[True]), f"the breadth between two walls along {name}"
+
+
+def _sizes(run, bodies):
+    """Radii of grains; of shapes those of balls as large."""
+    return (run.volumes(bodies) / ball(run.dimension).volume)**(1.0 / run.dimension)
+
+
 def _measure(run, bodies, along, how):
     """The row of a state with grains."""
     width, floor, shares = how
-    volume = run.volumes(bodies)
-    # of shapes: of balls as large
-    size = (volume / ball(run.dimension).volume)**(1.0 / run.dimension)
+    size = _sizes(run, bodies)
     mean = size.mean()
     width = 4.0 * mean if width is None else width
     position, axis = bodies.position, "xy".index(along or "x")
     floor = np.quantile(position[:, -1] - size, LOWEST) if floor is None else floor
-    middle = _median(position[:, :-1], volume)
-    # between a full row or layer of grains, each on a square of its diameter, and one grain alone in a bin
-    layer = FULL * volume.mean() / (2.0 * mean)**(run.dimension - 1)
-    round_one, breadth = _is_round(run, along), 1.0 if run.dimension == 2 else _breadth(run, position[:, 1 - axis], mean, 1 - axis)
+    round_one = _is_round(run, along)
+    across = np.eye(run.dimension)[1 - axis] * run.period[1 - axis] if run.dimension == 3 and not round_one else np.zeros(run.dimension)
+    # bodies with shapes hang together by the balls that hold them
+    held = heap_of(position, bodies.radius, 2.0 * LINK * mean, [across] if np.any(across) else [])
+    place, radius = position[held, :-1], size[held]
+    middle = _median(place, radius**run.dimension)
     if round_one:
-        place = np.linalg.norm(position[:, :-1] - middle, axis=1)
-        fronts = [ends(place, volume, lambda r: np.pi * r**2, layer, (width, PLACES, 2.0 * width)).min() + mean]
+        out = np.linalg.norm(place - middle, axis=1)
+        # a disk of this radius has the same moment of inertia
+        rim = np.sqrt(2.0 * np.mean(out**2))
+        fronts = [end(out, radius, rim * np.arctan2(*(place - middle).T), 2.0 * STRIP * mean)]
     else:
         fronts = []
         for side in (-1.0, 1.0):
-            place = side * (position[:, axis] - middle[axis])
-            beyond = place >= 0.0
-            end = ends(place[beyond], volume[beyond], lambda x: breadth * x, layer, (width, PLACES, 0.0)).min() + mean
-            fronts.append(middle[axis] + side * end)
+            out = side * (place[:, axis] - middle[axis])
+            beyond = out >= 0.0
+            beside = place[:, 1 - axis] if run.dimension == 3 else np.zeros(len(place))
+            fronts.append(middle[axis] + side * end(out[beyond], radius[beyond], beside[beyond], 2.0 * STRIP * mean if run.dimension == 3 else 0.0))
     heights, angles = [], []
     for shift in np.arange(SHIFTS) / SHIFTS * width:
         cells, height = columns(position + shift * np.append(np.ones(run.dimension - 1), 0.0), size, width, floor)
@@ -146,10 +202,8 @@ def _median(place, volume):
     return np.array([along[rows][np.searchsorted(np.cumsum(volume[rows]), 0.5 * volume.sum())] for along, rows in zip(place.T, order.T)])
 
 
-def _breadth(run, place, mean, axis):
-    """Of a channel: its period, or what the grains take up, without the outermost ones."""
-    if run.period[axis] > 0.0:
-        return run.period[axis]
+def _breadth(place, mean):
+    """What the grains take up along an axis, without the outermost ones."""
     low, high = np.quantile(place, (LOWEST, 1.0 - LOWEST))
     return high - low + 2.0 * mean
 

@@ -6,8 +6,9 @@ from whole_file import hdf5_file, whole_file
 
 from .bodies_table import BodiesTable
 from .restarts import claim_bodies_file, make_parent
-from .results import BodiesFile, _text
+from .results import BodiesFile
 from .shapes import ball
+from .starts import text_of
 from .tables import ResultsError, Table
 
 #: what its bodies files say of their origin
@@ -200,10 +201,10 @@ def _shape_columns(read, parts):
         number, turn = np.zeros(len(part["id"]), dtype=np.int64), np.tile(np.eye(4)[0] if width == 4 else [0.0], (len(part["id"]), 1))
         if np.any(_shaped(part)):
             with one._open() as file:
-                own = _text(file["bodies/shape"].attrs["names"]).split(",")
+                own = text_of(file["bodies/shape"].attrs["names"]).split(",")
                 if "orientation" in part:
                     turn = part["orientation"].reshape(-1, width)
-                    axes.setdefault(_text(file["bodies/orientation"].attrs.get("axes", "written")), one.path)
+                    axes.setdefault(text_of(file["bodies/orientation"].attrs.get("axes", "written")), one.path)
             names += [name for name in own if name not in names]
             number = np.array([0, *(names.index(name) + 1 for name in own)])[part["shape"]]
         numbers.append(number)

@@ -7,6 +7,8 @@ from .tables import ResultsError, Table
 CELL = {2: 5.0, 3: 3.5}
 #: heights farther than so many interquartile ranges from the quartiles are those of stray grains
 FENCE = 3.0
+#: part of the range of radii below which a gap between two kinds is none
+GAP = 0.1
 
 
 def mixing(run, by="size", value=None, cell=None, since=0.0):
@@ -36,6 +38,15 @@ def mixing(run, by="size", value=None, cell=None, since=0.0):
         raise ResultsError(f"{run.path}: no written state has grains of both kinds by {by}; expected two sizes, materials or sides, or another value")
     names = ("step", "time", "mixing", "height_difference", "segregation", "share", "grains", "cells")
     return Table({name: np.array(values) for name, values in zip(names, zip(*rows))})
+
+
+def split_radius(run, value=None, since=0.0):
+    """The radius [m] above which grains are of the first kind by size, and whether radii are spread on both sides of it without a gap, so that it divides one
+    range of sizes and not two kinds."""
+    bodies = next(bodies for bodies in (free_grains(run, step) for step, _ in states_since(run, since)) if len(bodies))
+    limit = _size_limit(bodies, value)
+    below, above = bodies.radius[bodies.radius <= limit], bodies.radius[bodies.radius > limit]
+    return limit, len(below) > 0 and len(above) > 0 and above.min() - below.max() < GAP * (bodies.radius.max() - bodies.radius.min())
 
 
 def states_since(run, since):
@@ -92,7 +103,7 @@ def _kind(run, bodies, by, value):
         number = _material(run, value)
         return lambda held: held.material == number
     if by == "size":
-        limit = 0.5 * (bodies.radius.min() + bodies.radius.max()) if value is None else _number(value, "radius")
+        limit = _size_limit(bodies, value)
         return lambda held: held.radius > limit
     axes = "xyz"[:run.dimension]
     if by not in tuple(axes):
@@ -100,6 +111,10 @@ def _kind(run, bodies, by, value):
     place = bodies.position[:, axes.index(by)]
     above = bodies.id[place > (np.median(place) if value is None else _number(value, by))]
     return lambda held: np.isin(held.id, above)
+
+
+def _size_limit(bodies, value):
+    return 0.5 * (bodies.radius.min() + bodies.radius.max()) if value is None else _number(value, "radius")
 
 
 def _material(run, value):
@@ -114,7 +129,8 @@ def _material(run, value):
     except (TypeError, ValueError):
         number = 0
     if not 1 <= number <= len(names):
-        raise ResultsError(f"{run.path}: material {value!r}; expected one of {', '.join(map(str, names)) or 'two and more, the case has none'}")
+        known = ", ".join(map(str, names)) or "none, the case has no &material"
+        raise ResultsError(f"{run.path}: {'no second material' if value is None else f'material {value!r}'}; expected one of {known}")
     return number
 
 

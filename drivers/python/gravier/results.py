@@ -7,9 +7,9 @@ import numpy as np
 
 from .case import CaseError, entries
 from .checksum import is_whole
-from .run_words import verdict
+from .run_words import doubts, verdict
 from .shapes import axes_of, ball, shapes_of
-from .starts import Start, starts_in
+from .starts import Start, starts_in, text_of
 from .tables import ResultsError, Table, one_line, read_table
 
 #: columns without which nothing can be drawn
@@ -183,7 +183,7 @@ class Run:
             for key in ("name", "shape"):
                 if file[f"boundaries/{key}"].dtype.kind in "iuf":
                     raise ResultsError(f"{self.path}: /boundaries/{key}: numbers; expected texts")
-                rows[key] = np.array([_text(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
+                rows[key] = np.array([text_of(value) for value in self._values(file[f"boundaries/{key}"])], dtype=str)
         for key in {"edges", "axes"} & set(rows):
             rows[key] = rows[key].reshape(len(rows[key]), -1, self.dimension)
         return rows
@@ -234,7 +234,7 @@ class Run:
                 return []
             tables = {name: Table({key: self._values(value) for key, value in group.items() if isinstance(value, h5py.Dataset)})
                       for name, group in [("shapes", file["shapes"]), *file["shapes"].items()] if isinstance(group, h5py.Group)}
-        tables["shapes"]["name"] = np.array([_text(value) for value in tables["shapes"].name])
+        tables["shapes"]["name"] = np.array([text_of(value) for value in tables["shapes"].name])
         return shapes_of(tables)
 
     def outlines(self, step=None):
@@ -295,13 +295,20 @@ class Run:
         return found
 
     def verdict(self):
-        """What run.log says of the whole run, restarts with it: 'converged', 'not converged', 'converged only by' another criterion than the velocity
-        error, or 'not finished'."""
+        """What run.log says of the whole run, restarts with it: 'converged', 'converged with doubts', which `doubts` has, 'not converged', 'converged only by'
+        another criterion than the velocity error, or 'not finished'."""
+        return verdict(self._log())
+
+    def doubts(self):
+        """What makes the results less than converged ones, in the words of run.log: projected or large overlaps, grains too fast for the step, large errors of
+        velocities, drift, fallen grains. Empty where there is nothing of the kind."""
+        return doubts(self._log())
+
+    def _log(self):
         try:
-            text = (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
+            return (self.directory / "run.log").read_text(encoding="utf-8", errors="replace")
         except OSError as reason:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
-        return verdict(text)
 
     def history(self):
         """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""
@@ -309,7 +316,14 @@ class Run:
 
     def trace(self):
         """trace.csv: a row a check of a solve; written with `trace = .true.`."""
+        self._check_own("trace.csv", "trace")
         return read_table(self.directory / "trace.csv", ("step", "iteration", "residual"))
+
+    def _check_own(self, name, key):
+        """Refuse a file of an older run in the same directory: one that no case of this run asks for."""
+        path = self.directory / name
+        if path.exists() and not any(keys.get(key) is True for start in self.starts for keys in start.case.get("output", [])):
+            raise ResultsError(f"{path}: of an older run in this directory, since this one has no &output {key} = .true.; expected a run that writes it")
 
     def _split(self, rows):
         if rows is None:
@@ -366,6 +380,7 @@ class Run:
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
         step = self.find_step(step)
         path = self.directory / "bodies.vtkhdf"
+        self._check_own("bodies.vtkhdf", "vtk")
         with _opened(path, "that of a run with &output vtk = .true.") as file:
             steps = file["VTKHDF/Steps"]
             count = int(steps.attrs["NSteps"])
@@ -508,7 +523,3 @@ def _path(given, what):
         return Path(given)
     except TypeError:
         raise ResultsError(f"{given!r}: expected the path of {what}") from None
-
-
-def _text(value):
-    return value.decode() if isinstance(value, bytes) else str(value)

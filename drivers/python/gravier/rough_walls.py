@@ -74,7 +74,7 @@ def _write(bodies, path, numbers, group, removed):
 
 def _write_contacts(contacts, file, group_of, gone):
     """Contacts whose boundary stays and whose grains are not both in one group."""
-    names = contacts["boundaries"][0].decode().split("\n") if "boundaries" in contacts else []
+    names = contacts["boundaries"][0].decode(errors="replace").split("\n") if "boundaries" in contacts else []
     left = [name for name in names if name not in gone]
     place = {-1 - k: -1 - left.index(name) for k, name in enumerate(names) if name in left}
     candidate, antagonist = contacts["candidate"][()], contacts["antagonist"][()]

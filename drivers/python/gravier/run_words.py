@@ -1,7 +1,12 @@
-"""What run.log says of convergence, over all starts of a run."""
+"""What run.log says of convergence and of doubts, over all starts of a run."""
 import re
 
 VERDICTS = {"yes": "converged", "NO": "not converged"}
+#: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which shifts are small, and
+#: overlaps, in mean radii, beyond which grains are in each other
+OFTEN, LITTLE, DEEP = 0.1, 0.01, 0.1
+#: parts of the last words that raise no doubt: projections that shift grains by a little of their paths, and what the words are of
+HARMLESS = re.compile(r"overlaps were projected in .* of the paths of grains$|errors and overlaps are those since the restart$")
 
 
 def starts_of(text):
@@ -24,8 +29,35 @@ def convergence(text):
     return worst or (doubts or said or [""])[-1]
 
 
+def doubts(text):
+    """What makes the results less than the begin of the last words says: large errors of velocities, overlaps, grains too fast for the step, drift, fallen
+    grains; of all starts, as the lines `finished` have it. Empty where there is nothing of the kind."""
+    found = []
+    for lines in starts_of(text):
+        _, *parts = re.split(r"; |, but ", said_of(lines, "finished").rpartition("; results in ")[0])
+        found += _doubts_before_interruption(lines)
+        found += [part.replace(" of them", " of the steps") for part in parts if not HARMLESS.match(part)]
+    return "; ".join(dict.fromkeys(found))
+
+
+def _doubts_before_interruption(lines):
+    """Of a start without last words, which has ended by a limit of time or a signal: its projected and its large overlaps. What else there is to doubt,
+    checkpoints keep."""
+    if not said_of(lines, "interrupted"):
+        return []
+    found = []
+    often = re.search(r"\n +projected in (\d+) of (\d+) steps .*, (\S+) of its path", "\n".join(["", *lines]))
+    if often and int(often[1]) > OFTEN * int(often[2]) and float(often[3]) >= LITTLE:
+        found.append(f"overlaps were projected in {100.0 * int(often[1]) / int(often[2]):.0f} % of the {often[2]} steps before an interruption: the results are not those of the "
+                     "contact law")
+    depth = re.search(r"later at most \S+ m, (\S+) of ([a-z ]+)", said_of(lines, "overlaps"))
+    if depth and float(depth[1]) > DEEP:
+        found.append(f"overlaps came to {float(depth[1]):g} of {depth[2]}")
+    return found
+
+
 def verdict(text):
-    """'converged', 'not converged', 'converged only by' or 'not finished': of a whole log."""
+    """'converged', 'converged with doubts', 'not converged', 'converged only by' or 'not finished': of a whole log."""
     last = said_of(starts_of(text)[-1], "finished")
     if not last:
         return "not finished"
@@ -33,4 +65,5 @@ def verdict(text):
         return "not converged"
     said = convergence(text)
     # without a step there is nothing to say
-    return VERDICTS.get(said.split(":")[0], "converged only by") if said else "converged"
+    found = VERDICTS.get(said.split(":")[0], "converged only by") if said else "converged"
+    return "converged with doubts" if found == "converged" and doubts(text) else found

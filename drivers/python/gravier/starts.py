@@ -13,6 +13,11 @@ class Start(NamedTuple):
     case: dict
 
 
+def text_of(value):
+    """A text of an HDF5 file. What is not UTF-8 in a name, which the program does not mind, becomes a replacement character, as in tables and logs."""
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+
+
 def starts_in(run):
     """The starts that the open group /run of results.h5 tells of, the first one first."""
     # earlier versions kept no restarts
@@ -21,8 +26,7 @@ def starts_in(run):
 
 
 def _start_in(group, step):
-    version, command, text = (value.decode() if isinstance(value, bytes) else str(value)
-                              for value in (group.attrs[name] for name in ("version", "command", "input_text")))
+    version, command, text = (text_of(group.attrs[name]) for name in ("version", "command", "input_text"))
     return Start(step, version, command, text, parse_namelist(text))
 
 

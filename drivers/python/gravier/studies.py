@@ -9,11 +9,12 @@ from whole_file import whole_file
 
 from .case import CaseError, claim, ended, made_directory, run, value_text
 from .results import Run
+from .run_words import doubts
 
 #: what the table of a study begins with
 HEADER = ("run", "status")
-#: its columns behind those of the keys: solves that missed their goal, and the largest velocity error over U
-JUDGED = ("steps_missed", "worst_error")
+#: its columns behind those of the keys: solves that missed their goal, the largest velocity error over U, and what else the last words doubt
+JUDGED = ("steps_missed", "worst_error", "doubts")
 
 
 def study(base, changes, directory, ranks=1, results=None, fresh=False):
@@ -21,8 +22,8 @@ def study(base, changes, directory, ranks=1, results=None, fresh=False):
     `directory`. Yields, when each run is over, ({(group, key): value}, its directory, its exit status). A key of a group that stands several
     times is (group, name, key), with the `name` of the group, or its number from 1. Keys that change together are a tuple of such keys, whose
     values are tuples: {(("time", "step"), ("time", "steps")): [(1e-3, 100), (5e-4, 200)]}. study.csv in `directory` has a row for each run that
-    ended with status 0 or 3: its directory, its exit status, its values, how many of its steps missed their goal, and its worst velocity error
-    over U, by the last words of its log. `results` is a function of a finished run, a gravier.Run, that returns {column: value}: these columns
+    ended with status 0 or 3: its directory, its exit status, its values, how many of its steps missed their goal, its worst velocity error over U,
+    and its doubts, by the last words of its log. `results` is a function of a finished run, a gravier.Run, that returns {column: value}: these columns
     follow. A run that has ended with the same case stays as it is, unless a file of this case has changed since, or `fresh`. Warns of these runs, and of
     runs that an older, larger study has left."""
     points = _points(changes)
@@ -60,12 +61,12 @@ def _case_of(base, point):
 
 
 def _judged(place):
-    """How many steps of a run missed their goal, and its worst velocity error over U, which are the last words of its log; None where they do not
-    tell it."""
+    """How many steps of a run missed their goal, its worst velocity error over U, and its doubts, which are the last words of its log; None where they do
+    not tell it."""
     said = (place / "terminal.log").read_text(encoding="utf-8", errors="replace")
     missed = re.search(r"^converged +(?:NO: (\d+) of \d+ solves? did not reach|)", said, re.M)
     worst = re.search(r"^accuracy +velocity error at most (\S+) of U", said, re.M)
-    return int(missed[1] or 0) if missed else None, float(worst[1]) if worst else None
+    return int(missed[1] or 0) if missed else None, float(worst[1]) if worst else None, doubts(said)
 
 
 def _own_results(results, groups, place, point, known):

@@ -58,7 +58,7 @@ class Table(dict):
 def read_table(path, columns=()):
     """A CSV file with one row of names: numbers by column. `columns` are those that it must have. A last row without its end is left out."""
     try:
-        with open(path, newline="", encoding="ascii") as file:
+        with open(path, newline="", encoding="utf-8", errors="replace") as file:
             # the last row of a run that is under way or was killed may be cut off
             header, *rows = list(csv.reader(file.read().rpartition("\n")[0].splitlines())) or [[]]
     except OSError as reason:
@@ -80,7 +80,7 @@ def read_table(path, columns=()):
 
 def write_table(path, columns, digits=6):
     """Columns by name as a CSV file with one row of names."""
-    with whole_file(path) as part, open(part, "w", encoding="ascii", newline="") as file:
+    with whole_file(path) as part, open(part, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(columns)
         table.writerows([f"{value:.{digits}g}" if isinstance(value, (float, np.floating)) else value for value in row]

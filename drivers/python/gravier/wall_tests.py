@@ -5,6 +5,8 @@ from .tables import ResultsError, Table
 
 #: a normal whose component is above this lies along an axis
 ALONG = 0.99
+#: part of the largest strain of a test above which a way through air is told
+TOLD = 0.01
 
 
 def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
@@ -15,13 +17,13 @@ def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
     `axial` is the axis of the load, the last one unless told, `lateral` the axes, such as "x", whose mean stress it is compared with, all others unless
     told. Strains are shortenings over the sizes at the end of the first step after the time `since` [s]; earlier rows are left out. Along periodic axes
     the period is the size. Stresses are those of the columns `stress_xx`, ... where history.csv has them, else forces on planes over their areas; along a
-    periodic axis they need the columns."""
+    periodic axis they need the columns. With the columns sin_phi is that of the largest and the smallest principal stress, else that of the axial and the
+    lateral one, and below 0 where the axial one is smaller."""
     axes = "xyz"[:run.dimension]
     axial, lateral = _chosen_axes(axes, axial, lateral)
     if not isinstance(mean, (int, np.integer)) or mean < 1:
         raise ResultsError(f"mean {mean!r}: expected a whole number of steps above 0")
-    history = run.history()
-    history = Table({name: values[history.time > since] for name, values in history.items()})
+    history = _history_since(run, since)
     planes = {axis: _planes(run, history, axis) for axis in axes}
     rows = _with_sizes(run, history, planes)
     if len(rows) < mean:
@@ -39,13 +41,55 @@ def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
     found["lateral_stress"] = np.mean([rows[f"stress_{axis}"] for axis in lateral], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         found["stress_ratio"] = found["axial_stress"] / found["lateral_stress"]
-        found["sin_phi"] = (found["axial_stress"] - found["lateral_stress"]) / (found["axial_stress"] + found["lateral_stress"])
+        largest, smallest = _principal(rows, axes) if "shear_xy" in rows else (found["axial_stress"], found["lateral_stress"])
+        found["sin_phi"] = (largest - smallest) / (largest + smallest)
     return Table(found)
+
+
+def sine_of_means(run, options, first, since=0.0):
+    """sin_phi of the mean stresses of all rows of wall_test from row `first` on, which is not the mean of a ratio; `options` are axial, lateral and mean."""
+    axial, lateral, mean = options
+    time = run.history().time
+    time = time[time > since]
+    rows = len(time) // mean - first
+    return float(wall_test(run, axial, lateral, rows * mean, since if first == 0 else time[first * mean - 1]).sin_phi[0])
+
+
+def ways_through_air(run, since=0.0):
+    """Planes that bear nothing at first after the time `since` [s], and move: rows (name, time at which each first bears [s], strain until then)."""
+    history, found = _history_since(run, since), []
+    for axis in "xyz"[:run.dimension]:
+        names = _planes(run, history, axis)
+        if names is None or len(history) == 0:
+            continue
+        size = history[f"position_{axis}:{names[1]}"] - history[f"position_{axis}:{names[0]}"]
+        strain = 1.0 - size / size[0]
+        for name in names:
+            bears, place = np.flatnonzero(history[f"force_{axis}:{name}"] != 0.0), history[f"position_{axis}:{name}"]
+            if len(bears) > 0 and abs(place[bears[0]] - place[0]) > TOLD * np.abs(strain).max() * size[0]:
+                found.append((name, float(history.time[bears[0]]), float(strain[bears[0]])))
+    return found
 
 
 def stresses_from(run):
     """Where the stresses of wall_test come from, in words."""
     return "means over the contacts" if "stress_xx" in run.history() else "forces on planes"
+
+
+def _history_since(run, since):
+    history = run.history()
+    return Table({name: values[history.time > since] for name, values in history.items()})
+
+
+def _principal(rows, axes):
+    """The largest and the smallest principal stress of each row."""
+    stress = np.zeros((len(rows), len(axes), len(axes)))
+    for a, one in enumerate(axes):
+        stress[:, a, a] = rows[f"stress_{one}"]
+        for b, other in enumerate(axes[:a]):
+            stress[:, a, b] = stress[:, b, a] = rows[f"shear_{other}{one}"]
+    principal = np.linalg.eigvalsh(stress)
+    return principal[:, -1], principal[:, 0]
 
 
 def _chosen_axes(axes, axial, lateral):
@@ -76,7 +120,7 @@ def _planes(run, history, axis):
 
 
 def _with_sizes(run, history, planes):
-    """Sizes of the box and normal stresses along the axes in each step, compression positive."""
+    """Sizes of the box and stresses in each step, compression positive: normal ones along the axes and, where history.csv has them, shear stresses."""
     rows = Table(step=history.step, time=history.time)
     for number, (axis, names) in enumerate(planes.items()):
         if names is None:
@@ -86,6 +130,8 @@ def _with_sizes(run, history, planes):
     for axis, names in planes.items():
         if f"stress_{axis}{axis}" in history:
             rows[f"stress_{axis}"] = history[f"stress_{axis}{axis}"]
+            # the two differ where grains turn ever faster
+            rows.update({f"shear_{other}{axis}": 0.5 * (history[f"stress_{other}{axis}"] + history[f"stress_{axis}{other}"]) for other in planes if other < axis})
         elif names is None:
             raise ResultsError(f"{run.directory}/history.csv: no column stress_{axis}{axis}, which a periodic axis needs; &output stress = .true. writes it")
         else:
