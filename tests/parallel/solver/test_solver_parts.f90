@@ -17,7 +17,7 @@ program test_solver_parts
   use gravier_levels, only: levels_t
   use gravier_layered_start, only: carry_loads
   use gravier_layer_trial, only: layer_trial_t
-  use gravier_velocity_error, only: velocity_error_t, copies_ready
+  use gravier_velocity_error, only: velocity_error_t, copies_ready, violations_allowed
   use gravier_residual_verdict, only: find_residual_verdict, excess_of, residual_ends, residual_waits, residual_in_vain
   use gravier_check_schedule, only: check_schedule_t
   use gravier_fresh_start, only: fresh_start_t
@@ -703,6 +703,11 @@ contains
     call check_equal(verdict, residual_ends, "planes that move within the accuracy are no contradiction")
     call find_residual_verdict(sim%problem, sim%method, velocity, iterations, 1.0e9_dp, verdict)
     call check_equal(verdict, residual_ends, "velocities within the accuracy")
+    ! a single contact counts by itself, whatever the estimates for the whole are
+    velocity%largest_violation = 2.0_dp*violations_allowed*max(allowed, velocity%criterion())
+    call check_close(excess_of(velocity, allowed), velocity%largest_violation/(violations_allowed*allowed), 1.0e-12_dp, &
+      & "a contact that violates its law")
+    call check_close(excess_of(velocity, 0.0_dp), 0.0_dp, 0.0_dp, "nothing to compare with")
   end subroutine check_verdict
 
   !> F is 0 where impulses and velocities obey the law, whether contacts are open, or stick, slide, roll and pivot or not; near by,
