@@ -6,8 +6,8 @@ from one_line import counted
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
 #: as the last words of the program judge: the fraction of steps with projected overlaps, the part of the paths of grains below which
-#: shifts are small, the velocity error over U
-OFTEN, LITTLE, FAR_OFF = 0.1, 0.01, 0.5
+#: shifts are small, and the part below which they are no fault in any number of steps; the velocity error over U
+OFTEN, LITTLE, NEGLIGIBLE, FAR_OFF = 0.1, 0.01, 1e-3, 0.5
 #: overlaps, in mean radii, up to which grains are where they should be, and beyond which they are in each other
 SHALLOW, DEEP = 0.02, 0.1
 #: the question whose answer says nothing of the run
@@ -139,10 +139,10 @@ def how_often_projected(log, history):
     small = re.search(r", (\S+) of its path", told)
     grade = GOOD if share == 0.0 else BAD if share > OFTEN else DOUBT
     if small and float(small[1]) < LITTLE:
-        grade = DOUBT if share > OFTEN else GOOD
+        grade = DOUBT if share > OFTEN and float(small[1]) >= NEGLIGIBLE else GOOD
     words = [told] if told else []
     # what came before the log: how far grains were shifted then is not known
-    before = history.projected[:max(0, len(history) - known)] if recorded else numpy.zeros(0)
+    before = history.projected[history.step <= history.step[-1] - known] if recorded else numpy.zeros(0)
     if (before > 0).any():
         grade = BAD if grade == BAD else DOUBT
         part = percent(float((before > 0).mean()))
@@ -150,7 +150,8 @@ def how_often_projected(log, history):
     if not words:
         return Answer(question, GOOD, f"No step projected overlaps. {overlap}")
     often = share > OFTEN or (len(before) > 0 and float((before > 0).mean()) > OFTEN)
-    return Answer(question, grade, f"{'Yes, often' if often else 'A little'}: {'; '.join(words)}. {overlap}")
+    how = "Yes, often" if often and grade != GOOD else "Often, but by too little to matter" if often else "A little"
+    return Answer(question, grade, f"{how}: {'; '.join(words)}. {overlap}")
 
 
 def last_part(log, history):
