@@ -199,7 +199,8 @@ class Report(RunTestCase):
         head = "Gravier 0.1.0 (a), dense\n"
         restart = 2 * head + "restart     from the checkpoint of step 200\n"
         for text, steps, projected, grade, words in (
-                (head + often.format("1.8E-07"), 100, 30, "doubt", "Yes, often: projected in 30 of 100 steps"),
+                (head + often.format("1.8E-07"), 100, 30, "good", "Often, but by too little to matter: projected in 30 of 100 steps"),
+                (head + often.format("2.0E-03"), 100, 30, "doubt", "Yes, often: projected in 30 of 100 steps"),
                 (head + often.format("2.0E-02"), 100, 30, "bad", "Yes, often: projected in 30 of 100 steps"),
                 (head + seldom.format("1.8E-07"), 100, 3, "good", "A little: projected in 3 of 100 steps"),
                 (head + seldom.format("2.0E-02"), 100, 3, "doubt", "A little: projected in 3 of 100 steps"),
