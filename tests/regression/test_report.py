@@ -230,6 +230,13 @@ class Report(RunTestCase):
         table = gravier.results.Table({"time": np.arange(4.0), "force_y:lid": np.arange(1.0, 5.0), "position_y:lid": np.array([0.3, 0.2, 0.1, 0.01])})
         self.assertEqual([(panel.label, panel.places) for panel in figures.boundary_panels(table)], [("force along y [N]", False), ("position along y [m]", True)])
 
+    def test_shear(self):
+        """A sheared cell has its shear stresses and its deformation among the curves; what stays 0 is left out."""
+        table = gravier.results.Table(time=np.arange(3.0), stress_xx=np.ones(3), stress_xy=np.ones(3), stress_yx=np.ones(3), stress_yy=np.ones(3),
+                                      pressure=np.ones(3), cell_strain_x=np.zeros(3), cell_strain_y=np.arange(3.0), cell_shear_xy=np.arange(3.0))
+        self.assertEqual([(panel.label, [name for *_, name in panel.curves]) for panel in figures.stress_panels(table, 2)],
+                         [("stress [N/m]", ["xx", "yy", "xy", "pressure"]), ("deformation of the cell", ["strain y", "shear xy"])])
+
     def test_steps_above_the_goal(self):
         """One step that missed its goal is one step, not steps; what missed something else is said beside it."""
         for above, missed, words in ((2, 2, "It was above this goal in 2 steps."), (1, 1, "It was above this goal in 1 step."),
