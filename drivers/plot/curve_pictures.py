@@ -5,7 +5,7 @@ import matplotlib.pyplot as plt
 import numpy
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
@@ -163,25 +163,55 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
     return figure
 
 
+class Curve:
+    """What a panel of a history shows: a column, its opposite `-A`, or a ratio `A/B` or `-A/B` of two columns. A name that is a column is that column."""
+
+    def __init__(self, text, known):
+        self.text, self.sign, self.below = text, 1.0, None
+        if text not in known and text.startswith("-"):
+            self.sign, text = -1.0, text[1:]
+        if text not in known and "/" in text:
+            text, self.below = text.split("/", 1)
+        self.above = text
+        self.names = [name for name in (self.above, self.below) if name is not None]
+
+    def values(self, history):
+        """NaN where the ratio has none."""
+        values = self.sign * numpy.asarray(history[self.above], float) if self.sign < 0.0 else history[self.above]
+        if self.below is None:
+            return values
+        below = numpy.asarray(history[self.below], float)
+        return numpy.divide(values, below, out=numpy.full(len(below), numpy.nan), where=below != 0.0)
+
+    def label(self, dimensions):
+        sign = "−" if self.sign < 0.0 else ""
+        if self.below is None:
+            return sign + label_of_all(self.above, dimensions)
+        (above, unit), (below, other) = (label_of_all(name, dimensions).removesuffix("]").split(" [") if " [" in label_of_all(name, dimensions)
+                                         else (label_of_all(name, dimensions), "") for name in self.names)
+        # a long name has two lines beside its panel
+        return f"{sign}{above} /{chr(10) if len(above + below) > 20 else ' '}{below}" + ("" if unit == other else f" [{unit or 1}{f'/({other})' if other else ''}]")
+
+
 def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
     """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
-    many rows. Columns are all that the first run has numbers in unless told."""
+    many rows. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told."""
     histories = [run.history() if table == "history.csv" else read_measured(run, table) for run in runs]
     columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
         if len(history) == 0:
             raise PictureError(f"{run.directory / table}: no row; expected one at least")
-        for name in [*columns, against]:
+        for name in [*(name for column in columns for name in Curve(column, history).names), against]:
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     if rows > 1:
         histories = [history.means(rows) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
-    panels = [Panel(label_of_all(column, dimensions), [(history[against], history[column], name if k == 0 else None)
-                                                       for name, history in zip(names, histories)],
-                    counts=column == "iterations", places=bool(PLACES.match(column)))
-              for k, column in enumerate(columns)]
+    curves = [Curve(column, histories[0]) for column in columns]
+    panels = [Panel(curve.label(dimensions), [(history[against], curve.values(history), name if k == 0 else None) for name, history in zip(names, histories)],
+                    counts=curve.text == "iterations", places=curve.below is None and bool(PLACES.match(curve.above)))
+              for k, curve in enumerate(curves)]
     return draw_panels(panels, along=label_of_all(against, dimensions))
 
 
@@ -310,6 +340,8 @@ def draw_profile(run, name, steps, columns, mean):
                                   figsize=(0.9 + 2.3 * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
                                   sharex=not upright, sharey=upright)
     places = places.ravel()
+    if upright:
+        figure.get_layout_engine().set(wspace=0.08)
     for axes, column in zip(places, columns):
         draw_column(axes, run, tables, column, axis, None if len(tables) == 1 else bar.norm([run.time(step) for step in steps]))
         grid(axes)
@@ -339,3 +371,6 @@ def draw_column(axes, run, tables, column, axis, times):
     unit = "N/m" if run.dimension == 2 else "Pa"
     label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)
     fit_axis(axes.xaxis if upright else axes.yaxis, shown, label, logarithms=False)
+    if upright:
+        # narrow panels side by side: numbers at their ends must not touch
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=4))

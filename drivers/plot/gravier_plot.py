@@ -68,7 +68,9 @@ def parse(arguments):
     packing.add_argument("--step", type=int, metavar="N", help="a step that results.h5 holds; the last one unless told")
     packing.add_argument("--dpi", type=int, default=200, metavar="N", help="of a PNG (200)")
     history = kinds.add_parser("history", parents=[several], help="columns of history.csv, or of a table of gravier_measure, against time or another column")
-    history.add_argument("--columns", metavar="A,B", help=f"{HISTORY} unless told, of another table all")
+    history.add_argument("--columns", metavar="A,B", help=f"{HISTORY} unless told, of another table all; -A changes the sign, A/B is a ratio")
+    # columns with a sign are no options
+    history._negative_number_matcher = re.compile(r"-[A-Za-z]")
     history.add_argument("--table", default="history.csv", metavar="FILE", help="another table in each DIR, such as mixing.csv of gravier_measure")
     history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain")

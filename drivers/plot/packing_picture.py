@@ -17,6 +17,10 @@ FAINTEST = 0.02  # forces below this part of the largest are not drawn
 MOST_SHADED = 20000  # spheres that get a highlight each
 VIEW = (-60.0, 20.0)  # where the eye is unless told, degrees
 COLOURS = ("speed", "velocity_x", "velocity_y", "velocity_z", "rotation", "pressure", "radius", "material", "subdomain", "none")
+#: values of a state that stand for all of its bodies in the colours of a movie, at most
+SAMPLES = 2001
+#: width of a character of a title, inches
+CHARACTER = 0.068
 #: numbers of things, not quantities
 KINDS = ("material", "subdomain")
 
@@ -180,6 +184,7 @@ def draw_chains(axes, run, step, view, force, box=None):
     """Force chains: a segment for each loaded contact, as thick as its normal force, in another colour where it pulls; `force` is that of
     the thickest. With a box (low, high), those that begin or end in it."""
     segments, normal = run.chains(step)
+    segments = segments + shifts_into_cell(run, step, segments[:, 0])[:, None]
     if box is not None:
         inside = numpy.all((segments >= box[0]) & (segments <= box[1]), axis=2).any(axis=1)
         segments, normal = segments[inside], normal[inside]
@@ -200,6 +205,26 @@ def cell_corners(run, step):
     if cell is None:
         return numpy.zeros((0, run.dimension))
     return cell.origin.ravel() + numpy.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]) @ cell.edge
+
+
+def shifts_into_cell(run, step, points):
+    """The edges by which points (n, d) lie outside of a periodic cell of the plane that moves (n, d): bodies are kept in an upright box."""
+    cell = run.cell(step) if run.dimension == 2 else None
+    if cell is None:
+        return numpy.zeros_like(points)
+    return -numpy.floor((points - cell.origin.ravel()) @ numpy.linalg.inv(cell.edge)) @ cell.edge
+
+
+def bodies_shown(run, step):
+    """The bodies where a picture has them: in the cell that it shows."""
+    bodies = run.bodies(step)
+    return gravier.Table({**bodies, "position": bodies.position + shifts_into_cell(run, step, bodies.position)})
+
+
+def outlines_shown(run, step, bodies):
+    """The outlines of bodies with shapes where a picture has them."""
+    shifts = bodies.position - run.bodies(step).position
+    return [[points + shift for points in outline] for outline, shift in zip(run.outlines(step), shifts)]
 
 
 def points_of(run, step, options):
@@ -245,7 +270,7 @@ def draw_packing(run, step, options, frame=None):
     and box."""
     frame = frame or Frame()
     step = run.find_step(step)
-    bodies, contacts = run.bodies(step), run.contacts(step)
+    bodies, contacts = bodies_shown(run, step), run.contacts(step)
     if len(bodies) == 0:
         raise PictureError(f"{run.path}: no body in step {step}; expected one at least")
     view, walls, part = View(run.dimension, *options.view or VIEW), Walls(run, step), asked_box(run, options.box)
@@ -268,7 +293,7 @@ def draw_packing(run, step, options, frame=None):
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
 
     values, label, how = colours(run, step, bodies, options.colour, frame.limits, slice(None) if seen is None else seen)
-    outlines = run.outlines(step) if shaped(bodies) else None
+    outlines = outlines_shown(run, step, bodies) if shaped(bodies) else None
     drawn = bodies
     if seen is not None:
         drawn = chosen(bodies, seen)
@@ -292,6 +317,8 @@ def draw_packing(run, step, options, frame=None):
         axes.set_axis_off()
     if options.regions:
         draw_regions(axes, run, step, view, *box_around(bodies, walls))
+    if CHARACTER * len(title) > figure.get_figwidth() - 0.5:
+        title = title.replace(": ", ":\n").replace(" disks, ", " disks,\n").replace(" spheres, ", " spheres,\n").replace(" bodies, ", " bodies,\n")
     axes.set_title(title, fontsize=9, loc="left", pad=18 if options.chains else 6)
     if outside > 0:
         # beside the name of the axis, or below it where there is no room
@@ -307,10 +334,10 @@ def draw_packing(run, step, options, frame=None):
 
 def shared_frame(run, steps, options):
     """Box, colours and forces that hold for all steps of a movie."""
-    lows, highs, limits, force, errors = [], [], [], 0.0, error_speeds(run)
+    lows, highs, samples, leasts, force, errors = [], [], [], [], 0.0, error_speeds(run)
     part = asked_box(run, options.box)
     for step in steps:
-        bodies = run.bodies(step)
+        bodies = bodies_shown(run, step)
         low, high = frame_around(bodies, Walls(run, step), points_of(run, step, options))
         lows.append(low)
         highs.append(high)
@@ -318,17 +345,12 @@ def shared_frame(run, steps, options):
         if values is not None and part is not None:
             values = values[bodies_in(bodies, part)]
         if values is not None and values.any():
-            limits.append(spread(values, options.colour, least_colour(options.colour, errors.get(step, 0.0), bodies)))
+            samples.append(values if len(values) <= SAMPLES else numpy.quantile(values, numpy.linspace(0.0, 1.0, SAMPLES)))
+            leasts.append(least_colour(options.colour, errors.get(step, 0.0), bodies))
         if options.chains and run.contacts(step) is not None:
             force = max(force, numpy.abs(run.chains(step)[1]).max(initial=0.0))
     if not lows:
         raise PictureError(f"{run.path}: no body in any step; expected one at least")
-    return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), shared_limits(limits), force or None)
-
-
-def shared_limits(limits):
-    """Limits of colours that hold for several pictures, about 0 where one has negative values; None where there are none."""
-    if not limits:
-        return None
-    low, top = min(least for least, _ in limits), max(most for _, most in limits)
-    return (min(low, -top), max(-low, top)) if low < 0.0 else (low, top)
+    # of the bodies of all states together: a few states must not make all others pale
+    limits = spread(numpy.concatenate(samples), options.colour, numpy.median(leasts)) if samples else None
+    return Frame(numpy.min(lows, axis=0), numpy.max(highs, axis=0), limits, force or None)

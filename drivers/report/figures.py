@@ -78,14 +78,19 @@ def motion_panels(history):
 
 
 def stress_panels(history, dimension):
-    """Stresses and solid fractions, of the scene and of regions."""
+    """Stresses and solid fractions, of the scene and of regions, and the deformation of a cell that moves. Of the shear stresses those above the diagonal
+    stand for all."""
     unit = "N/m" if dimension == 2 else "Pa"
     stress = [(name.removeprefix("stress_"), history[name]) for name in history if re.fullmatch(r"stress_([xyz])\1", name)]
+    stress += [(name.removeprefix("stress_"), history[name]) for name in history if re.fullmatch(r"stress_(xy|xz|yz)", name)]
+    cell = [(name.removeprefix("cell_").replace("_", " "), history[name]) for name in history if re.match(r"cell_(strain|shear)_", name)]
+    cell = [(name, values) for name, values in cell if numpy.abs(values).max(initial=0.0) > 0.0]
     pressure = [(name.removesuffix("_pressure"), history[name]) for name in history if name.endswith("_pressure")]
     if "pressure" in history:
         stress.append(("pressure", history.pressure))
     fraction = [(name.removesuffix("solid_fraction").rstrip("_") or "scene", history[name]) for name in history if name.endswith("solid_fraction")]
-    named = ((f"stress [{unit}]", stress), (f"pressure of regions [{unit}]", pressure), ("solid fraction", fraction))
+    named = ((f"stress [{unit}]", stress), (f"pressure of regions [{unit}]", pressure), ("solid fraction", fraction),
+             ("deformation of the cell", cell))
     panels = [panel(history, label, columns) for label, columns in named if columns]
     return panels + [panel(history, label_of(name, dimension), [(None, history[name])]) for name in ("coordination",) if name in history]
 

@@ -6,8 +6,9 @@ from gravier.run_words import DEEP, LITTLE, OFTEN
 from one_line import counted
 
 GOOD, DOUBT, BAD, UNKNOWN = "good", "doubt", "bad", "unknown"
-#: as the last words of the program judge: the velocity error over U; overlaps, in mean radii, up to which grains are where they should be
-FAR_OFF, SHALLOW = 0.5, 0.02
+#: as the last words of the program judge: the part of the paths of grains below which their shifts are no fault in any number of steps; the velocity error
+#: over U; overlaps, in mean radii, up to which grains are where they should be
+NEGLIGIBLE, FAR_OFF, SHALLOW = 1e-3, 0.5, 0.02
 #: the question whose answer says nothing of the run
 FILES = "Are its files there and whole?"
 #: the parts of the sizes of its terms up to which a balance is one, and up to which it is nearly one
@@ -137,10 +138,10 @@ def how_often_projected(log, history):
     small = re.search(r", (\S+) of its path", told)
     grade = GOOD if share == 0.0 else BAD if share > OFTEN else DOUBT
     if small and float(small[1]) < LITTLE:
-        grade = DOUBT if share > OFTEN else GOOD
+        grade = DOUBT if share > OFTEN and float(small[1]) >= NEGLIGIBLE else GOOD
     words = [told] if told else []
     # what came before the log: how far grains were shifted then is not known
-    before = history.projected[:max(0, len(history) - known)] if recorded else numpy.zeros(0)
+    before = history.projected[history.step <= history.step[-1] - known] if recorded else numpy.zeros(0)
     if (before > 0).any():
         grade = BAD if grade == BAD else DOUBT
         part = percent(float((before > 0).mean()))
@@ -148,7 +149,8 @@ def how_often_projected(log, history):
     if not words:
         return Answer(question, GOOD, f"No step projected overlaps. {overlap}")
     often = share > OFTEN or (len(before) > 0 and float((before > 0).mean()) > OFTEN)
-    return Answer(question, grade, f"{'Yes, often' if often else 'A little'}: {'; '.join(words)}. {overlap}")
+    how = "Yes, often" if often and grade != GOOD else "Often, but by too little to matter" if often else "A little"
+    return Answer(question, grade, f"{how}: {'; '.join(words)}. {overlap}")
 
 
 def last_part(log, history):

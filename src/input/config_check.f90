@@ -386,6 +386,7 @@ contains
     call expect(report, config%output%directory(1:1) /= "~", "output", "directory", error, &
                 "a path without ~, which a shell replaces and this program does not")
     call expect(report, config%output%every >= 0, "output", "every", error)
+    call expect(report, config%output%history_every >= 1, "output", "history_every", error)
     call expect(report, config%output%checkpoint_every >= 0, "output", "checkpoint_every", error)
     call expect(report, config%output%fclib_step >= 0, "output", "fclib_step", error)
     call expect(report, config%output%fclib_step <= config%time%steps, "output", "fclib_step", error, &

@@ -327,6 +327,9 @@ module gravier_config_table
   type(key_t), parameter :: output_keys(*) = &
     [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
      key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
+     key_t("output", "history_every", kind_integer, "1", ">= 1", &
+           "steps between two rows of `history.csv`, which has the last step, too, and those in which grains enter, leave or "// &
+           "move too far, or a solve misses its goal"), &
      key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
      key_t("output", "vtk", kind_logical, ".false.", "", &
            & "write `bodies.vtkhdf` and, with `contacts`, `contacts.vtkhdf` for ParaView, with each written state"), &

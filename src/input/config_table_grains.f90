@@ -32,7 +32,8 @@ module gravier_config_table_grains
            count=3, unit="m", note="the period, along an axis that is periodic"), &
      key_t("sample", "solid_fraction", kind_real, "0.35", "in (0, 0.6)", &
            "fraction of the box that the grains fill, or the balls that enclose those with shapes, if its last size is 0; "// &
-           "random positions reach about 0.53 in 2D and 0.35 in 3D for grains of one radius; a larger fraction is refused", &
+           "random positions reach about 0.53 in 2D and 0.35 in 3D for grains of one radius in a wide box, and "// &
+           "0.45 in a 2D box two diameters wide; a fraction that leaves grains without a place is refused", &
            note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
      key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
      key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &

@@ -183,6 +183,8 @@ module gravier_config_types
     !> steps; 0 writes the last state only
     integer :: every
     logical :: contacts, trace, final_bodies, final_forces
+    !> steps between two rows of history.csv
+    integer :: history_every
     !> steps; 0 never
     integer :: checkpoint_every
     !> step whose problem is written as a file of FCLIB; 0 none

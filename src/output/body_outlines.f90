@@ -3,7 +3,7 @@ module gravier_body_outlines
   use gravier_kinds, only: dp, i8
   use gravier_narrow, only: narrow
   use gravier_rotation, only: cross
-  use gravier_orientation, only: orientation_matrix
+  use gravier_orientation, only: shape_axes
   use gravier_convex_piece, only: convex_piece_t
   use gravier_shape_library, only: shape_library_t
   use gravier_body_store, only: body_set_t
@@ -219,19 +219,10 @@ contains
     !> coordinates one after the other (3 n at least)
     real(dp), intent(out) :: points(:)
     integer(i8), intent(out) :: n
-    real(dp) :: axes(3, 3), angle
+    real(dp) :: axes(3, 3)
     integer :: i, d
 
-    if (bodies%no == 1) then
-      angle = bodies%orientation(1, k)
-      axes(:, :) = 0.0_dp
-      axes(1, 1) = cos(angle)
-      axes(2, 1) = sin(angle)
-      axes(1, 2) = -axes(2, 1)
-      axes(2, 2) = axes(1, 1)
-    else
-      call orientation_matrix(bodies%orientation(:, k), axes)
-    end if
+    call shape_axes(bodies%orientation(:, k), axes)
     points(:) = 0.0_dp
     n = outline%first(c + 1) - outline%first(c)
     do i = 1, narrow(n)

@@ -1,4 +1,4 @@
-!> history.csv: a row a step, the columns of the diagnostics last.
+!> history.csv: a row a step, or each few steps and where something is counted, the columns of the diagnostics last.
 module gravier_history_output
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
@@ -63,6 +63,7 @@ contains
     end associate
     self%stage = of_each_step
     self%schedule = schedule_t(every=1)
+    self%table%every = simulation%config%output%history_every
     call open_table(self%table, directory, "history.csv", history_header(simulation), simulation, error)
   end subroutine history_output_open
 
@@ -122,6 +123,7 @@ contains
 
     if (simulation%comm%rank /= 0) return
     associate (table => self%table, solve => figures%solve, interface_statistics => figures%interface_statistics)
+      call table%drop_row()
       call table%add(simulation%step)
       call table%add(simulation%time)
       call table%add(figures%contacts)
@@ -172,9 +174,16 @@ contains
       do k = 1, simulation%diagnostics%n_columns
         if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))
       end do
-      call table%end_row(error)
+      ! another row waits, since it may be that of the last step
+      if (mod(simulation%step, table%every) == 0 .or. counts_something(figures)) call table%end_row(error)
     end associate
   end subroutine history_output_write
+
+  !> Whether a step has counts that are added up over rows, or a solve that missed its goal: such a step has a row in any case.
+  pure logical function counts_something(figures) result(counts)
+    type(step_figures_t), intent(in) :: figures
+    counts = figures%left > 0 .or. figures%entered > 0 .or. figures%fast > 0 .or. figures%solve%status /= solve_converged
+  end function counts_something
 
   subroutine history_output_sync(self, error)
     class(history_output_t), intent(inout) :: self
@@ -185,6 +194,7 @@ contains
   subroutine history_output_finish(self, error)
     class(history_output_t), intent(inout) :: self
     type(error_t), allocatable, intent(inout) :: error
+    call self%table%keep_row(error)
     call self%table%close(error)
   end subroutine history_output_finish
 

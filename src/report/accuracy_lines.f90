@@ -212,9 +212,12 @@ contains
           & to_text(tally%path, 3)//" m"
         text = text//newline
       end if
-      if (tally%steps_with_cores > 0) text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
-        & " steps bodies overlapped by more than their roundings, in one step at most "// &
-        & to_text(tally%most_cores)//" pairs"//newline
+      if (tally%steps_with_cores > 0) then
+        text = text//indent//"in "//to_text(tally%steps_with_cores)//" of "//to_text(tally%steps)// &
+          & " steps bodies overlapped by more than their roundings, in one step at most "//to_text(tally%most_cores)//" pairs"
+        if (simulation%physics%laws%yields) text = text//"; where contacts yield, give the shapes a larger rounding"
+        text = text//newline
+      end if
       if (tally%steps_left_out > 0) text = text//"warning     in "//to_text(tally%steps_left_out)//" of "// &
         & counted(tally%steps, "step")//" bodies touched each other or a mesh in more points than are kept, which are the "// &
         & "deepest; at most "//counted(tally%most_left_out, "point")//" of a step were left out. Forces may be wrong there"//newline

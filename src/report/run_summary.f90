@@ -21,6 +21,8 @@ module gravier_run_summary
   real(dp), parameter :: least_share = 3.0_dp
   !> part of the paths of grains below which their shifts by projections are small
   real(dp), parameter :: little = 0.01_dp
+  !> the same below which they are no fault, however many steps make them
+  real(dp), parameter :: negligible = 1.0e-3_dp
   !> overlap of rigid contacts that is named, in mean radii, or halves of the mean thickness
   real(dp), parameter :: deep = 0.1_dp
   !> contacts of rank 0 below which more ranks do not pay
@@ -222,6 +224,7 @@ contains
         text = text//"; overlaps were projected in "//percent(tally%mended_share())//" of "//steps
         if (tally%shift < little*tally%path) then
           text = text//", by "//plain(100.0_dp*tally%shift/tally%path)//" % of the paths of grains"
+          if (tally%shift < negligible*tally%path) text = text//", which is too little to matter"
         else
           text = text//": the results are not those of the contact law"
         end if

@@ -15,6 +15,8 @@ module gravier_scale_report
   !> digits of a figure
   integer, parameter :: digits = 3
 
+  !> mean diameter from which the unit of lengths is named [m]
+  real(dp), parameter :: large_grains = 1.0_dp
   !> diameters by which loads may move a free grain in a step: that is h sqrt(P/rho)/d = 0.1 at the pressure of one layer of grains
   real(dp), parameter :: most_by_gravity = 1.0e-2_dp
   !> radii by which a grain may move in a step, lest it passes through others
@@ -53,6 +55,8 @@ contains
     associate (h => simulation%config%time%step, boundaries => simulation%decomposition%boundaries)
       g = norm2(scales%acceleration)
       text = "scales      mean diameter d = "//figure(scales%diameter)//" m"
+      ! such grains are rare, and millimetres are easily taken for the unit of lengths
+      if (scales%diameter >= large_grains) text = text//" (lengths are in metres)"
       if (g > 0.0_dp) text = text//"; g h = "//figure(g*h)//" m/s, "//figure(g*h**2/scales%diameter)// &
         & " mean diameters a step; sqrt(g d) = "//figure(sqrt(g*scales%diameter))//" m/s"
       text = text//newline

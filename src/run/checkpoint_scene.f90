@@ -93,7 +93,8 @@ contains
         return
       end if
       call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
-        & ": expected "//trim(adjustl(line_before))//", or a new run that begins with the final_bodies.h5 of this one")
+        & ": expected "//trim(adjustl(line_before))// &
+        & ", or a new run that begins with a state of this one: its final_bodies.h5, or a file of gravier.write_bodies")
       return
     end do
   end subroutine compare_options

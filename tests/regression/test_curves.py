@@ -53,6 +53,22 @@ class Axes(unittest.TestCase):
         self.assertEqual((axes.get_ylabel(), axes.yaxis.get_major_formatter()(20000.0, 0)), ("pressure [$10^{3}$ Pa]", "20"))
         plt.close(figure)
 
+    def test_expressions(self):
+        """Opposites and ratios of columns; a name that is a column is no expression, and a ratio to 0 is no number."""
+        history = {"stress_xy": np.array([1.0, -2.0, 3.0]), "stress_yy": np.array([2.0, 4.0, 0.0]), "force_y:a/b-c": np.ones(3),
+                   "kinetic_energy": np.array([1.0, 2.0, 3.0]), "max_overlap": np.full(3, 2.0), "coordination": np.full(3, 4.0)}
+        for text, values, label in (("stress_xy", [1.0, -2.0, 3.0], "stress xy [Pa]"), ("-stress_xy", [-1.0, 2.0, -3.0], "−stress xy [Pa]"),
+                                    ("stress_xy/stress_yy", [0.5, -0.5, np.nan], "stress xy / stress yy"),
+                                    ("-stress_xy/stress_yy", [-0.5, 0.5, np.nan], "−stress xy / stress yy"),
+                                    ("force_y:a/b-c", [1.0, 1.0, 1.0], "force y:a/b-c [N]"),
+                                    ("coordination/stress_yy", [2.0, 1.0, np.nan], "coordination /\nstress yy [1/(Pa)]"),
+                                    ("kinetic_energy/max_overlap", [0.5, 1.0, 1.5], "kinetic energy /\nlargest overlap [J/(m)]")):
+            curve = curve_pictures.Curve(text, history)
+            np.testing.assert_array_equal(curve.values(history), values, text)
+            self.assertEqual(curve.label([3]), label)
+        self.assertEqual(curve_pictures.Curve("-a/b", history).names, ["a", "b"])
+        self.assertEqual(gravier_plot.parse(["history", "run", "--columns", "-stress_xy/stress_yy,contacts"]).columns, "-stress_xy/stress_yy,contacts")
+
     def test_from_zero(self):
         """An axis begins at 0 where the values come down to a fifth of the largest one. That of places fits them in any case, without
         logarithms; a place that differs by rounding alone is constant."""

@@ -218,13 +218,17 @@ class Pictures(RunTestCase):
         plt.close(figure)
 
     def test_narrow(self):
-        """The bar of colours of a picture that is ten times as high as wide can be read."""
+        """The bar of colours of a picture that is ten times as high as wide can be read, and its title is not much wider than the picture."""
         column = {"scene": {"bodies": "column", "column_count": 20, "radius": 0.01, "wall_material": None}, "material": [], "law": [], "region": [],
                   "time": {"step": 1e-3, "steps": 10}, "output": {"vtk": False}}
         gravier.run(merged(DISKS, {"scene": {"lattice_count": None, "radius_min": None, "radius_max": None}}, column), self.here("column"))
         figure = packing_picture.draw_packing(gravier.Run(self.here("column/results")), None, self.options())
         box = self.boxes(figure, [figure.axes[0].child_axes[0]])[0]
         self.assertGreater((box[2] - box[0]) / figure.dpi, 0.08)
+        contacts = len(gravier.Run(self.here("column/results")).contacts())
+        self.assertEqual(figure.axes[0].get_title(loc="left"), f"step 10, t = 0.01 s:\n20 disks,\n{contacts} contacts")
+        title = self.boxes(figure, [figure.axes[0]._left_title])[0]
+        self.assertLess((title[2] - title[0]) / figure.dpi, figure.get_figwidth())
         plt.close(figure)
 
     def test_pulls(self):
@@ -252,6 +256,11 @@ class Pictures(RunTestCase):
         figure = packing_picture.draw_packing(run, None, self.options())
         limits = np.array([figure.axes[0].get_xlim(), figure.axes[0].get_ylim()]).T
         self.assertTrue(np.all(corners >= limits[0]) and np.all(corners <= limits[1]))
+        # all disks stand in the cell that is drawn, though the run keeps them in an upright box, and chains begin at their centres
+        cell = run.cell(100)
+        parts = [(points - corners[0]) @ np.linalg.inv(cell.edge) for points in (run.bodies(100).position, np.asarray(figure.axes[0].collections[0].get_offsets()))]
+        self.assertFalse(np.all((parts[0] >= 0.0) & (parts[0] <= 1.0)))
+        self.assertTrue(np.all((parts[1] >= -1e-12) & (parts[1] <= 1.0 + 1e-12)))
         plt.close(figure)
 
     def test_walls_that_turn(self):
@@ -410,6 +419,29 @@ class Pictures(RunTestCase):
             self.disks.region("layers/stress")
         with self.assertRaisesRegex(PictureError, "no single region has bins; expected one of none, the case has none"):
             curve_pictures.draw_profile(self.cylinder, None, None, ["pressure"], False)
+
+    def test_numbers_of_neighbours(self):
+        """Numbers below panels side by side do not touch."""
+        figure = curve_pictures.draw_profile(self.disks, "layers", [150], ["velocity", "solid_fraction", "stress", "pressure"], False)
+        for axes, value in zip(figure.axes, (-1.04, 0.8, 6700.0, 123456.0)):
+            axes.set_xlim(min(0.0, value), max(0.13, value))
+        figure.canvas.draw()
+        numbers = [self.boxes(figure, [label for label, place in zip(axes.get_xticklabels(), axes.get_xticks()) if axes.get_xlim()[0] <= place <= axes.get_xlim()[1]])
+                   for axes in figure.axes]
+        for left, right in zip(numbers, numbers[1:]):
+            self.assertLess(max(box[2] for box in left) + 2.0, min(box[0] for box in right))
+        plt.close(figure)
+
+    def test_shared_colours(self):
+        """The colours of a movie are those of 98 % of the bodies of all of its states together: one fast state does not make the others pale."""
+        speeds = {step: np.linspace(0.0, 1.0, 40) * (500.0 if step == 7 else 1.0) for step in range(100)}
+        scene = SimpleNamespace(path="run", dimension=2, case={}, region=None)
+        with unittest.mock.patch.multiple(packing_picture, error_speeds=lambda run: {}, Walls=lambda run, step: None, points_of=lambda *_: (),
+                                          bodies_shown=lambda run, step: step, frame_around=lambda *_: (np.zeros(2), np.ones(2)),
+                                          quantity=lambda run, step, bodies, kind: (speeds[step], "m/s", "speed"), least_colour=lambda *_: 0.0):
+            frame = packing_picture.shared_frame(scene, list(speeds), self.options(chains=False))
+        self.assertEqual(frame.limits[0], 0.0)
+        self.assertTrue(0.9 < frame.limits[1] <= 1.0, frame.limits)
 
     def test_empty_bins(self):
         """A bin without grains has no velocity: curves have a gap."""

@@ -310,14 +310,19 @@ class Package(RunTestCase):
         speeds = [np.linalg.norm(run.bodies(step).velocity, axis=1) for step in run.steps]
         tops = [np.quantile(values, 0.98) for values in speeds]
         self.assertLess(min(tops), 1e-3 * max(tops))
-        self.assertEqual(frame.limits, (0.0, max(tops)))
+        # of the bodies of all states together but those in which nothing moves
+        top = np.quantile(np.concatenate([values for values in speeds if values.any()]), 0.98)
+        self.assertEqual(frame.limits, (0.0, top))
+        self.assertLess(top, max(tops))
         how = [packing_picture.colours(run, step, run.bodies(step), "speed", frame.limits) for step in run.steps]
         self.assertEqual({label for _, label, _ in how}, {"speed [$10^{-3}$ m/s]"})
         for values, (shown, _, keys) in zip(speeds, how):
             np.testing.assert_allclose(shown, 1e3 * values, rtol=1e-12)
-            np.testing.assert_allclose([keys["norm"].vmin, keys["norm"].vmax], [0.0, 1e3 * max(tops)], rtol=1e-12)
-        self.assertEqual(packing_picture.shared_limits([(0.0, 1.0), (-3.0, 3.0), (-2.0, 2.0)]), (-3.0, 3.0))
-        self.assertIsNone(packing_picture.shared_limits([]))
+            np.testing.assert_allclose([keys["norm"].vmin, keys["norm"].vmax], [0.0, 1e3 * top], rtol=1e-12)
+        # about 0 where some state has negative values, and none where nothing moves
+        falls = packing_picture.shared_frame(run, list(run.steps), types.SimpleNamespace(**{**vars(options), "colour": "velocity_y"})).limits
+        self.assertEqual(falls[0], -falls[1])
+        self.assertIsNone(packing_picture.shared_frame(run, [0], options).limits)
 
     def test_movies_by_ffmpeg(self):
         """Frames go to the program ffmpeg one after the other, of even size, which its coding of .mp4 wants. A program that keeps what it is

@@ -199,7 +199,8 @@ class Report(RunTestCase):
         head = "Gravier 0.1.0 (a), dense\n"
         restart = 2 * head + "restart     from the checkpoint of step 200\n"
         for text, steps, projected, grade, words in (
-                (head + often.format("1.8E-07"), 100, 30, "doubt", "Yes, often: projected in 30 of 100 steps"),
+                (head + often.format("1.8E-07"), 100, 30, "good", "Often, but by too little to matter: projected in 30 of 100 steps"),
+                (head + often.format("2.0E-03"), 100, 30, "doubt", "Yes, often: projected in 30 of 100 steps"),
                 (head + often.format("2.0E-02"), 100, 30, "bad", "Yes, often: projected in 30 of 100 steps"),
                 (head + seldom.format("1.8E-07"), 100, 3, "good", "A little: projected in 3 of 100 steps"),
                 (head + seldom.format("2.0E-02"), 100, 3, "doubt", "A little: projected in 3 of 100 steps"),
@@ -228,6 +229,13 @@ class Report(RunTestCase):
         """Curves of places fit their panel, wherever 0 is; those of forces do not."""
         table = gravier.results.Table({"time": np.arange(4.0), "force_y:lid": np.arange(1.0, 5.0), "position_y:lid": np.array([0.3, 0.2, 0.1, 0.01])})
         self.assertEqual([(panel.label, panel.places) for panel in figures.boundary_panels(table)], [("force along y [N]", False), ("position along y [m]", True)])
+
+    def test_shear(self):
+        """A sheared cell has its shear stresses and its deformation among the curves; what stays 0 is left out."""
+        table = gravier.results.Table(time=np.arange(3.0), stress_xx=np.ones(3), stress_xy=np.ones(3), stress_yx=np.ones(3), stress_yy=np.ones(3),
+                                      pressure=np.ones(3), cell_strain_x=np.zeros(3), cell_strain_y=np.arange(3.0), cell_shear_xy=np.arange(3.0))
+        self.assertEqual([(panel.label, [name for *_, name in panel.curves]) for panel in figures.stress_panels(table, 2)],
+                         [("stress [N/m]", ["xx", "yy", "xy", "pressure"]), ("deformation of the cell", ["strain y", "shear xy"])])
 
     def test_steps_above_the_goal(self):
         """One step that missed its goal is one step, not steps; what missed something else is said beside it."""

@@ -1,4 +1,5 @@
 """The last words of a run are true: what was mended, how solves ended, how wrong velocities were, and what is not advised."""
+import os
 import re
 
 import gravier_runs
@@ -67,10 +68,25 @@ class LastWords(RunTestCase):
         self.assertLessEqual((history["velocity_error"] / history["velocity_scale"]).max(), 0.1)
 
     def test_small_shifts(self):
-        """Shifts that are small against the paths of grains are named, and said to be no other law."""
-        write(self.here("fast.csv"), f"id,x,y,radius,vx\n1,0,0,{RADIUS},3\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},3\n")
-        run = run_case(merged(PAIR, {"scene": {"bodies_file": "../fast.csv"}, "time": {"steps": 9, "step": 1e-2}}), 1, self.here("fast"))
-        self.assertRegex(line(run, "finished"), r"overlaps were projected in 11 % of them, by 0\.65 % of the paths of grains; results in")
+        """Shifts that are small against the paths of grains are named, and said to be no other law, and still smaller ones to be no fault."""
+        for speed, words in ((3, r"0\.65 % of the paths of grains; "), (60, r"3\.2E-02 % of the paths of grains, which is too little to matter; ")):
+            write(self.here("fast.csv"), f"id,x,y,radius,vx\n1,0,0,{RADIUS},{speed}\n2,{2 * RADIUS - OVERLAP},0,{RADIUS},{speed}\n")
+            run = run_case(merged(PAIR, {"scene": {"bodies_file": "../fast.csv"}, "time": {"steps": 9, "step": 1e-2}}), 1, self.here(f"fast {speed}"))
+            self.assertRegex(line(run, "finished"), r"overlaps were projected in 11 % of them, by " + words)
+
+    def test_small_roundings(self):
+        """Squares on soft springs overlap by more than the default rounding; the log says what holds them, and a larger rounding does."""
+        case = {"scene": {"bodies": "file", "bodies_file": "b.csv", "shapes": "a.shapes", "friction": 0.3, "wall_material": "a"},
+                "material": {"name": "a"}, "law": {"materials": "a", "kind": "elastic", "normal_stiffness": 1e3},
+                "boundary": {"shape": "plane", "normal": [0.0, 1.0]}, "time": {"step": 1e-3, "steps": 50}, "output": {"every": 0}}
+        for rounding, told in (("", True), ("rounding 0.003\n", False)):
+            directory = self.here(f"squares {len(rounding)}")
+            os.makedirs(directory)
+            write(os.path.join(directory, "a.shapes"), f"shape square\n{rounding}regular 4 0.01\n")
+            write(os.path.join(directory, "b.csv"), "id,shape,mass,x,y\n1,square,0.1,0,0.0072\n2,square,0.1,0,0.0213\n")
+            run = run_case(case, 1, directory)
+            self.assert_status(run, 0)
+            self.assertEqual("; where contacts yield, give the shapes a larger rounding\n" in run.stdout, told, run.stdout)
 
     def test_mended(self):
         """Lengths of shifts are those of the formula, and the last line says so in more than a tenth of the steps, on any ranks. In the

@@ -79,6 +79,12 @@ class Scales(RunTestCase):
         memory = r"about \d+ MiB at most on a rank"
         self.assertEqual(re.sub(memory, "", text), re.sub(memory, "", self.check_case(LATTICE)))
 
+    def test_unit_of_lengths(self):
+        """Grains of metres are large: millimetres that are meant as such are seen."""
+        large = self.check_case(LATTICE, {"scene": {"radius_min": 4.0, "radius_max": 6.0}, "time": {"step": 0.01}})
+        self.assertRegex(large, r"scales      mean diameter d = \S+ m \(lengths are in metres\); g h")
+        self.assertNotIn("lengths are in metres", self.check_case(LATTICE))
+
     def test_shear(self):
         text = self.check_case(SHEAR)
         speed, rate = math.sqrt(1000.0 / DENSITY), 2e-3 / HEIGHT

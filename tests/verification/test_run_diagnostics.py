@@ -538,6 +538,46 @@ class Diagnostics(RunTestCase):
                 if not name.endswith("_seconds"):
                     np.testing.assert_array_equal(history[name], values, name)
 
+    # ---- rows of history.csv
+
+    def test_thinned_history(self):
+        """Rows of each seventh step, of those with counts and of the last one are those of the whole history, also through a restart; sums of
+        counts are those of all steps, and a hole is refused."""
+        case = {"scene": {"dimension": 2, "bodies": "none", "friction": 0.3}, "time": {"step": 1e-3, "steps": 200},
+                "boundary": {"name": "hole", "shape": "outlet", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
+                "insertion": {"lower": [0.0, 0.05], "upper": [0.2, 0.1], "rate": 200.0, "radius": 0.008, "velocity": [0.0, -0.5]},
+                "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}, "output": {"every": 0, "checkpoint_every": 90}}
+        thin = merged(case, {"output": {"history_every": 7}})
+        whole = gravier("case.nml", directory=self.written("whole", case))
+        self.assert_status(whole, 0)
+        every = whole.history()
+        counted = (every["left"] > 0) | (every["entered"] > 0) | (every["fast"] > 0)
+        rows = (every["step"] % 7 == 0) | counted | (every["step"] == 200)
+        self.assertTrue(0 < (every["left"] > 0).sum() < 200 and rows.sum() < 150, rows.sum())
+        for title, ranks in (("thin", 1), ("ranks", 2)):
+            part = self.written(title, merged(thin, {"time": {"steps": 91}}))
+            self.assert_status(gravier("case.nml", directory=part, ranks=ranks), 0)
+            write(os.path.join(part, "case.nml"), namelist(thin))
+            run = gravier("--restart", "case.nml", directory=part)
+            self.assert_status(run, 0)
+            found = run.history()
+            for name, values in every.items():
+                if not name.endswith("_seconds"):
+                    np.testing.assert_array_equal(found[name], values[rows], name)
+        for name in ("left", "left_mass", "entered"):
+            self.assertAlmostEqual(found[name].sum(), every[name].sum(), delta=1e-12 * every[name].sum())
+        write(os.path.join(part, "case.nml"), namelist(merged(case, {"time": {"steps": 210}})))
+        refused = gravier("--restart", "case.nml", directory=part)
+        self.assert_status(refused, 2)
+        self.assertIn("were expected", refused.stdout + refused.stderr)
+
+    def written(self, title, case):
+        """A directory with this case."""
+        directory = self.here(f"rows {title}")
+        os.makedirs(directory)
+        write(os.path.join(directory, "case.nml"), namelist(case))
+        return directory
+
 
 if __name__ == "__main__":
     unittest.main()

@@ -11,6 +11,8 @@ import unittest
 
 import numpy as np
 
+from packings import POURS, poured_shapes
+from shaped_scenes import box, prepare, shaped_case
 from gravier_runs import SOURCE, RunTestCase, differences, gravier, merged, namelist, run_case, steps_of, write
 import gravier as package
 
@@ -170,6 +172,48 @@ class Regions(RunTestCase):
         self.assertAlmostEqual(run.history()["above_granular_temperature"][-1],
                                (parts @ (np.array([1.0, -2.0]) - mean)**2) / parts.sum() / 3.0, delta=1e-14)
         self.assertEqual(run.history()["above_grains"][-1], 2)
+
+    def test_bricks_between_walls(self):
+        """Bricks whose sides lie on walls and on sides of regions are all inside, and cut ones count by their area."""
+        library = "shape brick\nrounding 0.002\npolygon  0 0  0.2 0  0.2 0.1  0 0.1\n"
+        directory = prepare(self.here("bricks"), 2, [], library)
+        write(os.path.join(directory, "bodies.csv"), "id,shape,mass,x,y\n1,brick,1,0.1,0.05\n2,brick,1,0.1,0.15\n")
+        walls = [{"shape": "plane", "point": [0.0, 0.0], "normal": [1.0, 0.0]}, {"shape": "plane", "point": [0.2, 0.0], "normal": [-1.0, 0.0]}]
+        run = run_case(shaped_case(2, walls, {"scene": {"gravity": [0.0, 0.0]}, "time": {"steps": 1}, "output": {"every": 1}, "region": [
+            {"name": "room", "lower": [0.0, 0.0], "upper": [0.2, 0.4]}, {"name": "corner", "lower": [0.0, 0.0], "upper": [0.05, 0.125]},
+            {"name": "left", "upper": [0.05]}, {"name": "bins", "axis": "y", "bins": 4, "lower": [0.0, 0.0], "upper": [0.2, 0.4]}]}), 1, directory)
+        self.assert_status(run, 0)
+        history = run.history()
+        self.assertAlmostEqual(history["room_solid_fraction"][-1], 0.5, delta=1e-12)
+        self.assertAlmostEqual(history["corner_solid_fraction"][-1], 1.0, delta=1e-12)
+        self.assertAlmostEqual(history["left_solid_fraction"][-1], 1.0, delta=1e-12)
+        np.testing.assert_allclose(self.region(run, "bins").solid_fraction, [1.0, 1.0, 0.0, 0.0], atol=1e-12)
+
+    def test_shapes_fill_space(self):
+        """Polygons, polyhedra and clusters: regions that fill space have the whole of their volume, and all figures are the same on any ranks."""
+        for dimension in (2, 3):
+            counts, spacing, _ = POURS[dimension]
+            side = 0.5 * counts[0] * spacing
+            parts = [{"name": f"part{k}", "lower": [side if k & 1 << d else -1e30 for d in range(dimension)],
+                      "upper": [1e30 if k & 1 << d else side for d in range(dimension)]} for k in range(2**dimension)]
+            case = shaped_case(dimension, box(counts, spacing), {
+                "scene": {"bodies_file": "bodies.h5", "friction": 0.3}, "time": {"steps": 2}, "solver": {"method": "nscdd"},
+                "decomposition": {"subdomains": 4}, "output": {"every": 1, "stress": True},
+                "region": [*parts, {"name": "bins", "axis": AXES[dimension - 1], "bins": 9}]})
+            runs = []
+            for ranks in (1, 2):
+                directory = self.here(f"shapes{dimension} {ranks}")
+                poured_shapes(directory, dimension)
+                runs.append(run_case(case, ranks, directory))
+                self.assert_status(runs[-1], 0)
+            history = runs[0].history()
+            self.same_history(*runs)
+            volume = history["volume"] * history["solid_fraction"]
+            shares = [history[part["name"] + "_volume"] * history[part["name"] + "_solid_fraction"] for part in parts]
+            np.testing.assert_allclose(np.sum(shares, axis=0), volume, rtol=1e-13)
+            self.assertGreater(np.min(shares), 0.0)
+            bins = self.region(runs[0], "bins")
+            np.testing.assert_allclose((bins.volume * bins.solid_fraction).sum(), volume[-1], rtol=1e-13)
 
     def test_plug_and_shear(self):
         """A plug has one velocity and no temperature; in a shear flow the velocity is linear, and the temperature that of a layer."""

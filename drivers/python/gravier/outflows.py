@@ -20,5 +20,12 @@ def outflow(run, mean=1, since=0.0):
     last = np.arange(mean - 1, len(rows), mean)
     found = {"step": rows.step[last], "time": rows.time[last], "left": np.cumsum(rows.left)[last], "left_mass": np.cumsum(rows.left_mass)[last]}
     for rate, total in (("number_rate", "left"), ("mass_rate", "left_mass")):
-        found[rate] = np.diff(found[total], prepend=0.0) / (mean * run.time_step())
+        found[rate] = np.diff(found[total], prepend=0.0) / np.diff(found["time"], prepend=_begin(run, history, since))
     return Table(found)
+
+
+def _begin(run, history, since):
+    """The time from which the rows after `since` count: that of the row before them, or of the start of the first row."""
+    before = history.time[history.time <= since]
+    every = (run.case.get("output") or [{}])[0].get("history_every", 1)
+    return before[-1] if len(before) else max(since, history.time[0] - every * run.time_step())

@@ -6,7 +6,7 @@ VERDICTS = {"yes": "converged", "NO": "not converged"}
 #: overlaps, in mean radii, beyond which grains are in each other
 OFTEN, LITTLE, DEEP = 0.1, 0.01, 0.1
 #: parts of the last words that raise no doubt: projections that shift grains by a little of their paths, and what the words are of
-HARMLESS = re.compile(r"overlaps were projected in .* of the paths of grains$|errors and overlaps are those since the restart$")
+HARMLESS = re.compile(r"overlaps were projected in .* of the paths of grains(, which is too little to matter)?$|errors and overlaps are those since the restart$")
 
 
 def starts_of(text):

@@ -4,7 +4,7 @@ module gravier_orientation
   use gravier_quaternion, only: multiply_quaternions
   implicit none
   private
-  public :: turn_orientation, orientation_matrix
+  public :: turn_orientation, orientation_matrix, shape_axes
 
 contains
 
@@ -47,5 +47,24 @@ contains
     axes(2, 3) = 2.0_dp*(q(3)*q(4) - q(1)*q(2))
     axes(3, 3) = 1.0_dp - 2.0_dp*(q(2)**2 + q(3)**2)
   end subroutine orientation_matrix
+
+  !> The axes of a body by its orientation as bodies store it; those of the plane are the first two.
+  pure subroutine shape_axes(orientation, axes)
+    !> (1) [rad], or (4)
+    real(dp), intent(in) :: orientation(:)
+    real(dp), intent(out) :: axes(3, 3)
+    real(dp) :: q(4)
+
+    if (size(orientation) == 4) then
+      q(:) = orientation
+      call orientation_matrix(q, axes)
+      return
+    end if
+    axes(:, :) = 0.0_dp
+    axes(1, 1) = cos(orientation(1))
+    axes(2, 1) = sin(orientation(1))
+    axes(1, 2) = -axes(2, 1)
+    axes(2, 2) = axes(1, 1)
+  end subroutine shape_axes
 
 end module gravier_orientation

@@ -26,6 +26,8 @@ module gravier_csv_writer
     character(len=:), allocatable :: path, row
     integer :: n_columns = 0
     integer :: n_cells = 0
+    !> steps that have rows at least: multiples of it
+    integer, public :: every = 1
   contains
     procedure :: open => csv_open
     procedure :: resume => csv_resume
@@ -37,6 +39,9 @@ module gravier_csv_writer
     procedure, private :: add_real => csv_add_real
     procedure, private :: add_logical => csv_add_logical
     procedure :: end_row => csv_end_row
+    !> forget the cells of a row that is not ended, or end it if it has all of them
+    procedure :: drop_row => csv_drop_row
+    procedure :: keep_row => csv_keep_row
     procedure :: sync => csv_sync
     procedure :: close => csv_close
     procedure :: is_open => csv_is_open
@@ -63,10 +68,10 @@ contains
   end subroutine csv_open
 
   !> Go on with a table whose first column counts steps: keep its rows up to step `last_step`, without a last line that
-  !> has no end, and append to them. Each step from that of the first row to `last_step` must have a row. A table that is missing or
-  !> died within its header is begun anew. What is kept replaces the older file in one indivisible operation; after a failure that
-  !> file is as it was. Failure: status_input for another header, or a row that has not a step and numbers under the names, or that
-  !> is missing; status_failure where the system refuses.
+  !> has no end, and append to them. Each multiple of `every` from the first row to `last_step` must have a row. A table that is
+  !> missing or died within its header is begun anew. What is kept replaces the older file in one indivisible operation; after a
+  !> failure that file is as it was. Failure: status_input for another header, or a row that has not a step and numbers under the
+  !> names, or that is missing; status_failure where the system refuses.
   subroutine csv_resume(self, path, header, last_step, error, options)
     class(csv_writer_t), intent(inout) :: self
     character(len=*), intent(in) :: path
@@ -83,7 +88,7 @@ contains
     call begin(self, path, header)
     kept = 0
     inquire (file=path, exist=exists)
-    if (exists) call find_kept(path, header//new_line("a"), self%n_columns, last_step, kept, error, options)
+    if (exists) call find_kept(self, header//new_line("a"), last_step, kept, error, options)
     call self%file%begin(path, error)
     if (kept == 0) call self%file%append(header//new_line("a"), error)
     call copy(path, kept, self%file, error)
@@ -106,21 +111,24 @@ contains
   end subroutine begin
 
   !> Number of bytes up to the end of the last whole row of a step not above `last_step`; 0 for part of a header.
-  subroutine find_kept(path, first_line, n_columns, last_step, kept, error, options)
-    character(len=*), intent(in) :: path
+  subroutine find_kept(table, first_line, last_step, kept, error, options)
+    class(csv_writer_t), intent(in) :: table
     !> the header with its end
     character(len=*), intent(in) :: first_line
-    integer, intent(in) :: n_columns, last_step
+    integer, intent(in) :: last_step
     integer(i8), intent(out) :: kept
     type(error_t), allocatable, intent(inout) :: error
     type(csv_option_t), intent(in), optional :: options(:)
-    character(len=:), allocatable :: text, row
+    character(len=:), allocatable :: path, text, row
     !> of the row before the present one
     integer(i8) :: before
+    !> the next step that must have one
+    integer(i8) :: next
     integer(i8) :: position, length, step
     integer :: line, unit, first, last
 
     kept = 0
+    path = table%path
     call open_old(path, unit, length, error)
     if (allocated(error)) return
     call read_text(path, unit, narrow(min(length, len(first_line, i8))), text, error)
@@ -143,11 +151,12 @@ contains
         if (last == 0) exit
         last = first + last - 1
         row = row//text(first:last - 1)
-        call check_row(path, line, n_columns, row, step, error)
+        call check_row(path, line, table%n_columns, row, step, error)
         if (allocated(error) .or. step > last_step) exit rows
-        if (before >= 0 .and. step > before + 1) then
+        next = (before/table%every + 1)*table%every
+        if (before >= 0 .and. step > next) then
           call raise(error, status_input, path//": line "//to_text(line)//": step "//to_text(step)//", but rows of step "// &
-            & to_text(before + 1)//" were expected")
+            & to_text(next)//" were expected")
           exit rows
         end if
         before = step
@@ -160,7 +169,8 @@ contains
       position = position + len(text)
     end do rows
     close (unit)
-    if (before >= 0 .and. before < last_step .and. .not. allocated(error)) call raise(error, status_input, path// &
+    next = (before/table%every + 1)*table%every
+    if (before >= 0 .and. next <= last_step .and. .not. allocated(error)) call raise(error, status_input, path// &
       & ": its last row is of step "//to_text(before)//", but rows up to step "//to_text(last_step)//" were expected; "// &
       & "without this file a new table begins")
   end subroutine find_kept
@@ -402,6 +412,20 @@ contains
     self%row = ""
     self%n_cells = 0
   end subroutine csv_end_row
+
+  subroutine csv_drop_row(self)
+    class(csv_writer_t), intent(inout) :: self
+
+    self%row = ""
+    self%n_cells = 0
+  end subroutine csv_drop_row
+
+  subroutine csv_keep_row(self, error)
+    class(csv_writer_t), intent(inout) :: self
+    type(error_t), allocatable, intent(inout) :: error
+
+    if (self%is_open() .and. self%n_cells == self%n_columns) call self%end_row(error)
+  end subroutine csv_keep_row
 
   !> Bring the rows to the disk, so that a loss of power leaves them. Failure: status_failure, with the system's reason.
   subroutine csv_sync(self, error)

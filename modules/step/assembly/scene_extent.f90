@@ -1,7 +1,7 @@
 !> The space that a scene takes along the axes, and within boundaries that enclose it.
 module gravier_scene_extent
   use gravier_kinds, only: dp
-  use gravier_orientation, only: orientation_matrix
+  use gravier_orientation, only: shape_axes
   use gravier_shape_library, only: shape_library_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
@@ -112,15 +112,7 @@ contains
     if (bodies%no == 0) return
     if (bodies%shape(k) == 0) return
     nd = bodies%nd
-    axes(:, :) = 0.0_dp
-    if (nd == 2) then
-      axes(1, 1) = cos(bodies%orientation(1, k))
-      axes(2, 1) = sin(bodies%orientation(1, k))
-      axes(1, 2) = -axes(2, 1)
-      axes(2, 2) = axes(1, 1)
-    else
-      call orientation_matrix(bodies%orientation(:, k), axes)
-    end if
+    call shape_axes(bodies%orientation(:, k), axes)
     reach(:) = -huge(1.0_dp)
     associate (shape => shapes%shape(bodies%shape(k)))
       do p = 1, size(shape%piece)

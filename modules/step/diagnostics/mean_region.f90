@@ -2,6 +2,8 @@
 !> and of branches of contacts lie in it.
 module gravier_mean_region
   use gravier_kinds, only: dp, i4, i8
+  use gravier_shape_library, only: body_shape_t
+  use gravier_body_part, only: turned_body_t, ball_below
   implicit none
   private
   public :: mean_region_t, region_grid_t, share_list_t, unbounded, region_words
@@ -57,6 +59,7 @@ module gravier_mean_region
   contains
     procedure :: bin_of => region_grid_bin_of
     procedure :: share_ball => region_grid_share_ball
+    procedure :: share_body => region_grid_share_body
     procedure :: share_segment => region_grid_share_segment
     procedure, private :: cut => region_grid_cut
     procedure, private :: place => region_grid_place
@@ -215,16 +218,59 @@ contains
       associate (y => x(d) - image*self%period(d))
         bin = self%place(y - radius)
         before = 0.0_dp
-        if (self%cuts_low(d) .or. bin > 1) before = below(self%side(bin - 1), y, radius, self%nd)
+        if (self%cuts_low(d) .or. bin > 1) before = ball_below(self%side(bin - 1), y, radius, self%nd)
         do k = bin, self%place(y + radius)
           behind = 1.0_dp
-          if (self%cuts_high(d) .or. k < self%n) behind = below(self%side(k), y, radius, self%nd)
+          if (self%cuts_high(d) .or. k < self%n) behind = ball_below(self%side(k), y, radius, self%nd)
           call add_share(list, k, (behind - before)*others)
           before = behind
         end do
       end associate
     end do
   end subroutine region_grid_share_ball
+
+  !> The parts of the volume of a body with a shape in the bins: exact wherever sides cut its polygons and polyhedra.
+  pure subroutine region_grid_share_body(self, x, shape, body, list)
+    class(region_grid_t), intent(in) :: self
+    !> its centre (nd) [m]
+    real(dp), intent(in) :: x(:)
+    type(body_shape_t), intent(in) :: shape
+    type(turned_body_t), intent(in) :: body
+    !> bins may stand twice
+    type(share_list_t), intent(inout) :: list
+    real(dp), dimension(self%nd) :: from, to
+    integer, dimension(self%nd) :: image, first, last
+    integer :: d, k
+
+    list%n = 0
+    do d = 1, self%nd
+      call find_images(self, d, x(d) + body%low(d), x(d) + body%high(d), first(d), last(d))
+    end do
+    if (any(first > last)) return
+    image(:) = first
+    images: do
+      do d = 1, self%nd
+        associate (y => x(d) - image(d)*self%period(d))
+          from(d) = merge(self%lower(d) - y, -unbounded, self%cuts_low(d))
+          to(d) = merge(self%upper(d) - y, unbounded, self%cuts_high(d))
+        end associate
+      end do
+      d = self%axis
+      associate (y => x(d) - image(d)*self%period(d))
+        do k = self%place(y + body%low(d)), self%place(y + body%high(d))
+          if (self%cuts_low(d) .or. k > 1) from(d) = self%side(k - 1) - y
+          to(d) = merge(self%side(k) - y, unbounded, self%cuts_high(d) .or. k < self%n)
+          call add_share(list, k, body%share_between(shape, from, to))
+        end do
+      end associate
+      do d = 1, self%nd
+        image(d) = image(d) + 1
+        if (image(d) <= last(d)) cycle images
+        image(d) = first(d)
+      end do
+      return
+    end do images
+  end subroutine region_grid_share_body
 
   !> The part of a ball between the sides of the region along an axis that has no bins.
   pure real(dp) function region_grid_cut(self, d, x, radius) result(part)
@@ -234,30 +280,9 @@ contains
     real(dp), intent(in) :: x, radius
 
     part = 1.0_dp
-    if (self%cuts_high(d)) part = below(self%upper(d), x, radius, self%nd)
-    if (self%cuts_low(d)) part = part - below(self%lower(d), x, radius, self%nd)
+    if (self%cuts_high(d)) part = ball_below(self%upper(d), x, radius, self%nd)
+    if (self%cuts_low(d)) part = part - ball_below(self%lower(d), x, radius, self%nd)
   end function region_grid_cut
-
-  !> The part of a ball, or a disk, on the lower side of a plane: 1/2 + t (3 - t^2)/4, or 1/2 + (t sqrt(1 - t^2) + asin t)/pi,
-  !> with t the distance of the plane from the centre in radii (volumes of segments).
-  pure real(dp) function below(plane, x, radius, nd) result(part)
-    !> [m]
-    real(dp), intent(in) :: plane, x, radius
-    integer, intent(in) :: nd
-    real(dp), parameter :: pi = acos(-1.0_dp)
-    real(dp) :: t
-
-    part = 0.0_dp
-    if (plane <= x - radius) return
-    part = 1.0_dp
-    if (plane >= x + radius) return
-    t = min(max((plane - x)/radius, -1.0_dp), 1.0_dp)
-    if (nd == 2) then
-      part = 0.5_dp + (t*sqrt(1.0_dp - t**2) + asin(t))/pi
-    else
-      part = 0.5_dp + 0.25_dp*t*(3.0_dp - t**2)
-    end if
-  end function below
 
   !> Images of the region, by whole periods along axis `d`, that something between two places may reach.
   pure subroutine find_images(grid, d, from, to, first, last)

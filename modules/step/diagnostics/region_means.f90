@@ -10,6 +10,8 @@ module gravier_region_means
   use gravier_physics, only: physics_t
   use gravier_contact_branch, only: find_branch
   use gravier_scene_extent, only: find_extent, share_inside
+  use gravier_body_part, only: turned_body_t
+  use gravier_body_store, only: body_set_t
   use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t, region_words
   use gravier_region_samples, only: region_samples_t, region_figures_t, sum_rows, centres, volume, mass, energy, ends, holders, &
     & momentum
@@ -293,7 +295,7 @@ contains
     call comm%sum_parts(parts, sums)
   end subroutine sum_tables
 
-  !> Add the grains of a subdomain of this rank: each by the share of its ball that lies in a bin, at the end of the step.
+  !> Add the grains of a subdomain of this rank: each by the share of it that lies in a bin, at the end of the step.
   subroutine add_grains(grid, decomposition, s, bins)
     type(region_grid_t), intent(in) :: grid
     type(decomposition_t), intent(in) :: decomposition
@@ -301,13 +303,14 @@ contains
     !> (rows, n)
     real(dp), intent(inout) :: bins(:, :)
     type(share_list_t) :: list
+    type(turned_body_t) :: turned
     real(dp) :: m
     integer :: k, j, b, nd
 
     nd = grid%nd
     associate (owned => decomposition%owned(s))
       do k = 1, owned%n
-        call grid%share_ball(owned%position(:, k), owned%radius(k), list)
+        call share_grain(grid, decomposition, owned, k, turned, list)
         do j = 1, list%n
           b = list%bin(j)
           bins(volume, b) = bins(volume, b) + list%share(j)*decomposition%figures%volume_of(owned, k)
@@ -323,6 +326,25 @@ contains
       end do
     end associate
   end subroutine add_grains
+
+  !> The shares of grain `k` in the bins.
+  subroutine share_grain(grid, decomposition, bodies, k, turned, list)
+    type(region_grid_t), intent(in) :: grid
+    type(decomposition_t), intent(in) :: decomposition
+    type(body_set_t), intent(in) :: bodies
+    integer, intent(in) :: k
+    !> room for a body with a shape
+    type(turned_body_t), intent(inout) :: turned
+    type(share_list_t), intent(inout) :: list
+
+    call grid%share_ball(bodies%position(:, k), bodies%radius(k), list)
+    if (bodies%no == 0 .or. list%n == 0) return
+    if (bodies%shape(k) == 0 .or. (list%n == 1 .and. list%share(1) >= 1.0_dp)) return
+    associate (shape => decomposition%shapes%shape(bodies%shape(k)))
+      call turned%turn(shape, grid%nd, bodies%radius(k), bodies%orientation(:, k))
+      call grid%share_body(bodies%position(:, k), shape, turned, list)
+    end associate
+  end subroutine share_grain
 
   !> Add the contacts of a subdomain of this rank: p l^T by the share of the branch l that lies in a bin (Weber 1966); their ends at
   !> free grains, and all free grains, by the centres of these. Places are those of the middle of the step, at which contacts are

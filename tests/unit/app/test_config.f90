@@ -199,7 +199,8 @@ contains
       // "&enriched direction = 2.5, direction_unit = 'absolute', contacts = 'active', interface = 'cg'" // newline &
       // "  cg_tolerance = 0.0625, cg_max_iterations = 77 /" // newline &
       // "&output directory = 'out', every = 4, contacts = .false., trace = .true., final_bodies = .true." // newline &
-      // "  checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600, fclib_step = 3, stress = .true." // newline &
+      // "  history_every = 5, checkpoint_every = 6, checkpoint_seconds = 60, walltime = 3600" // newline &
+      // "  fclib_step = 3, stress = .true." // newline &
       // "  tracked_bodies = 17, 203, tracked_forces = .true." // newline &
       // "  energy = .true." // newline &
       // "  structure = .true., boundary_forces = .true., vtk = .true. /" // newline
@@ -237,6 +238,7 @@ contains
     call check(.not. config%output%contacts, "contacts of output")
     call check(config%output%trace, "trace")
     call check(config%output%final_bodies, "final_bodies")
+    call check_equal(config%output%history_every, 5, "history_every")
     call check_equal(config%output%checkpoint_every, 6, "checkpoint_every")
     call check_equal(config%output%fclib_step, 3, "fclib_step")
     call check(all(config%output%tracked_bodies(:3) == [17, 203, 0]), "tracked_bodies")
@@ -344,6 +346,7 @@ contains
     call check(config%output%contacts, "default contacts of output")
     call check(.not. config%output%trace, "default trace")
     call check(.not. config%output%final_bodies, "default final_bodies")
+    call check_equal(config%output%history_every, 1, "default history_every")
     call check_equal(config%output%checkpoint_every, 0, "default checkpoint_every")
     call check_equal(config%output%fclib_step, 0, "default fclib_step")
     call check(all(config%output%tracked_bodies == 0), "no tracked_bodies by default")
@@ -905,6 +908,7 @@ contains
     call refuse(column // "&output tracked_forces = .true. /", &
       & "&output tracked_forces = .true.: expected .false. without tracked_bodies, whose forces it adds")
     call refuse(column // "&output fclib_step = -1 /", "&output fclib_step = -1: expected an integer >= 0")
+    call refuse(column // "&output history_every = 0 /", "&output history_every = 0: expected an integer >= 1")
     call refuse(column // "&output checkpoint_every = -1 /", "&output checkpoint_every = -1: expected an integer >= 0")
     call refuse(column // "&output checkpoint_seconds = -1 /", &
       "&output checkpoint_seconds = -1: expected a finite real number >= 0 (s)")

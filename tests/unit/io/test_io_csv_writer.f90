@@ -214,6 +214,18 @@ contains
     call table%resume(path, "step,x", 5, error)
     call check(.not. allocated(error), "a hole behind what is kept")
     call table%close(error)
+    call put("step,x"//newline//"4,1"//newline//"5,1"//newline//"8,1"//newline//"12,1"//newline)
+    table%every = 4
+    call table%resume(path, "step,x", 15, error)
+    call check(.not. allocated(error), "rows of multiples suffice")
+    call table%close(error)
+    call table%resume(path, "step,x", 16, error)
+    call expect(error, "its last row is of step 12, but rows up to step 16 were expected", "a multiple is missing", status_input)
+    table%every = 2
+    call table%resume(path, "step,x", 12, error)
+    call expect(error, "csv_writer.csv: line 4: step 8, but rows of step 6 were expected", "a hole between multiples", status_input)
+    table%every = 1
+    call table%close(error)
     call put("step,x"//newline//"4,1"//newline//"5,1"//newline)
     call table%resume(path, "step,x", 6, error)
     call expect(error, "csv_writer.csv: its last row is of step 5, but rows up to step 6 were expected; without this file a "// &

@@ -1,6 +1,9 @@
 !> Regions of means: the space that they take, the parts of balls, of segments and of points in their bins, also across a period.
 program test_mean_region
   use gravier_kinds, only: dp
+  use gravier_shape_library, only: body_shape_t
+  use gravier_body_part, only: turned_body_t
+  use gravier_simple_shapes, only: make_polygon
   use gravier_mean_region, only: mean_region_t, region_grid_t, share_list_t
   use gravier_check, only: check, check_close, check_equal, finish_checks
   implicit none
@@ -12,6 +15,7 @@ program test_mean_region
   call test_space()
   call test_balls()
   call test_bins()
+  call test_bodies()
   call test_periods()
   call test_points()
   call test_segments()
@@ -59,6 +63,19 @@ contains
     call grid%share_ball(x, radius, list)
     share = total(list, bin)
   end function ball_share
+
+  real(dp) function body_share(shape, grid, x, bin) result(share)
+    type(body_shape_t), intent(in) :: shape
+    type(region_grid_t), intent(in) :: grid
+    real(dp), intent(in) :: x(2)
+    integer, intent(in), optional :: bin
+    type(turned_body_t) :: body
+    type(share_list_t) :: list
+
+    call body%turn(shape, 2, shape%size, [0.0_dp])
+    call grid%share_body(x, shape, body, list)
+    share = total(list, bin)
+  end function body_share
 
   real(dp) function segment_share(grid, from, to, bin) result(share)
     type(region_grid_t), intent(in) :: grid
@@ -144,6 +161,38 @@ contains
     call check_close(ball_share(grid, [-0.3_dp, 0.4_dp], 0.1_dp, 1), 1.0_dp, 0.0_dp, "before the first bin")
     call check_close(ball_share(grid, [1.3_dp, 0.4_dp], 0.1_dp, 8), 1.0_dp, 0.0_dp, "behind the last bin")
   end subroutine test_bins
+
+  !> A square body of side 0.2 is cut exactly by all sides at once, by bins, and across a period; the ball around it does not count.
+  subroutine test_bodies()
+    type(mean_region_t) :: region, binned
+    type(region_grid_t) :: grid
+    type(body_shape_t) :: shape
+    character(len=:), allocatable :: message
+    real(dp) :: corners(2, 4)
+
+    corners(:, 1) = [-0.1_dp, -0.1_dp]
+    corners(:, 2) = [0.1_dp, -0.1_dp]
+    corners(:, 3) = [0.1_dp, 0.1_dp]
+    corners(:, 4) = [-0.1_dp, 0.1_dp]
+    call make_polygon("square", corners, 0.001_dp, shape, message)
+    region%lower(1) = 0.0_dp
+    region%upper(2) = 0.5_dp
+    grid = grid_of(region, 2, 0.0_dp)
+    call check_close(body_share(shape, grid, [0.1_dp, 0.4_dp]), 1.0_dp, 10*rounding, "its sides lie on those of the region")
+    call check_close(body_share(shape, grid, [0.05_dp, 0.45_dp]), 0.5625_dp, 10*rounding, "three quarters along both axes")
+    call check_close(body_share(shape, grid, [-0.11_dp, 0.3_dp]), 0.0_dp, 10*rounding, "outside, where its ball is not")
+    binned%axis = 1
+    binned%bins = 10
+    binned%upper(2) = 0.5_dp
+    grid = grid_of(binned, 2, 0.0_dp)
+    call check_close(body_share(shape, grid, [0.45_dp, 0.45_dp], 4), 0.1875_dp, 10*rounding, "the first of its bins")
+    call check_close(body_share(shape, grid, [0.45_dp, 0.45_dp], 5), 0.375_dp, 10*rounding, "the second")
+    call check_close(body_share(shape, grid, [0.45_dp, 0.45_dp]), 0.75_dp, 10*rounding, "all bins")
+    call check_close(body_share(shape, grid, [-0.3_dp, 0.3_dp], 1), 1.0_dp, 10*rounding, "before the first bin")
+    grid = grid_of(binned, 2, 1.0_dp)
+    call check_close(body_share(shape, grid, [0.05_dp, 0.3_dp], 10), 0.25_dp, 10*rounding, "across the period")
+    call check_close(body_share(shape, grid, [0.05_dp, 0.3_dp]), 1.0_dp, 10*rounding, "all bins of the period")
+  end subroutine test_bodies
 
   !> Regions repeat themselves with the cell; a whole period has no sides.
   subroutine test_periods()
