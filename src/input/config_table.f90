@@ -304,9 +304,8 @@ module gravier_config_table
            note="the product of `grid` if given, else `1`"), &
      key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
      key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
-           "a new partition is made if the largest over the mean number of contacts of a subdomain exceeds this value and "// &
-           "1.1 times what the last partition reached, or this value alone in one of the steps 16, 20, 24, 28, 32, 40, 48, "// &
-           "56, 64 ..., of which each doubling has four; 0: never")]
+           "a new partition is made if the largest over the mean number of contacts of a subdomain exceeds this value, and "// &
+           "1.1 times what the last one reached, but for the steps 16, 20, 24, 28, 32, 40, 48, 56, 64, 80 ...; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
     [key_t("enriched", "direction", kind_real, "0", ">= 0", &
@@ -328,8 +327,7 @@ module gravier_config_table
     [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
      key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
      key_t("output", "history_every", kind_integer, "1", ">= 1", &
-           "steps between two rows of `history.csv`, which has the last step, too, and those in which grains enter, leave or "// &
-           "move too far, or a solve misses its goal"), &
+           "steps between rows of `history.csv`, which also has the last step, steps with events and those of missed goals"), &
      key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
      key_t("output", "vtk", kind_logical, ".false.", "", &
            & "write `bodies.vtkhdf` and, with `contacts`, `contacts.vtkhdf` for ParaView, with each written state"), &
