@@ -294,11 +294,11 @@ class Recipes(unittest.TestCase):
             self.assertEqual({name for name in needed if name not in text}, set(), path)
         recipe = SOURCE / "cmake/packaging/spack/packages/gravier/package.py"
         compile(recipe.read_text(encoding="utf-8"), str(recipe), "exec")
-        names = re.findall(r"conda:[^)]*\) name=(?:'([^'=]*)|([\w-]+)) *", launcher)
+        names = re.findall(r"conda:[^)]*\) name=(?:\"'([^']*)'\"|([\w-]+)) *;;", launcher)
         conda = (SOURCE / "cmake/packaging/environment.yml").read_text(encoding="utf-8")
-        self.assertGreaterEqual(len(names), 4)
+        self.assertGreaterEqual(len(names), 6)
         for name in (quoted or plain for quoted, plain in names):
-            self.assertIn(f"- {name}", conda)
+            self.assertIn(f"- {name}\n", conda)
 
 
 class Blocks(unittest.TestCase):
