@@ -305,7 +305,7 @@ module gravier_config_table
      key_t("decomposition", "repartition_every", kind_integer, "0", ">= 0", "steps between two partitions; 0: never again"), &
      key_t("decomposition", "repartition_imbalance", kind_real, "0.0", "0 or > 1", &
            "a new partition is made if the largest over the mean number of contacts of a subdomain exceeds this value, and "// &
-           "1.1 times what the last one reached, but for the steps 16, 20, 24, 28, 32, 40, 48, 56, 64, 80 ...; 0: never")]
+           "1.1 times what the last one reached, unless 16, 20, 24, 28, 32, 40, 48 ... steps have been made; 0: never")]
 
   type(key_t), parameter :: enriched_keys(*) = &
     [key_t("enriched", "direction", kind_real, "0", ">= 0", &

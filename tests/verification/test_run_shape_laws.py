@@ -219,6 +219,26 @@ class ShapeLaws(RunTestCase):
                         else:
                             np.testing.assert_allclose(velocity, [2.0] + [0.0] * (3 * dimension - 4), atol=2e-5)
 
+    def test_a_gate_that_is_passed(self):
+        """A plate lies tilted on the end of a wall, from which a gate goes on upwards that the plate passes through: it is held as if the gate were not
+        there, by a mesh and by a segment, and with either as the gate."""
+        line = {"wall": "v -1.0 0.0 0\nv 0.0 0.0 0\nl 1 2\n", "gate": "v 0.0 1.0 0\nv 0.0 0.0 0\nl 1 2\n"}
+        mesh = {name: {"shape": "mesh", "file": write(f"{self.scratch}/{name}.obj", text), "material": name} for name, text in line.items()}
+        segment = {"wall": {"shape": "segment", "point": [-1.0, 0.0], "end": [0.0, 0.0], "material": "wall"},
+                   "gate": {"shape": "segment", "point": [0.0, 0.0], "end": [0.0, 1.0], "material": "gate"}}
+        library = "shape plate\nrounding 0.015\npolygon -0.3 -0.02  0.3 -0.02  0.3 0.02  -0.3 0.02\n"
+        laws = [{"materials": ["m", "gate"], "kind": "none"}, {"materials": ["m", "wall"], "kind": "coulomb", "friction": 1.0}]
+        for wall in (mesh, segment):
+            for gate in (mesh, segment):
+                with self.subTest(wall=wall["wall"]["shape"], gate=gate["gate"]["shape"]):
+                    directory = prepare(self.here(f"gate {wall['wall']['shape']} {gate['gate']['shape']}"), 2,
+                                        [body("plate", [0.0, 0.02020041836800911], -0.1, material=1, scale=1.0)], library)
+                    run = run_case(shaped_case(2, [wall["wall"], gate["gate"]], {
+                        "scene": {"gravity": [0.0, -G]}, "material": [{"name": "m", "density": 1000.0}, {"name": "wall"}, {"name": "gate"}], "law": laws,
+                        "time": {"step": 1e-3, "steps": 100}, "output": {"every": 100}}), 1, directory)
+                    self.assert_status(run, 0)
+                    self.assertLess(run.history()["max_overlap"].max(), 1e-7)
+
     @staticmethod
     def stretch(dimension, number, first, last, height):
         """A level stretch of an OBJ file, as the part of this number, from 0."""

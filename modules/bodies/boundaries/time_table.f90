@@ -194,8 +194,11 @@ contains
           high = middle
         end if
       end do
+      value = self%value(k, low)
+      ! between equal rows the value is theirs, without rounding
+      if (.not. abs(self%value(k, high) - value) > 0.0_dp) return
       share = (at - self%time(low))/(self%time(high) - self%time(low))
-      value = (1.0_dp - share)*self%value(k, low) + share*self%value(k, high)
+      value = (1.0_dp - share)*value + share*self%value(k, high)
     end if
   end function time_table_at
 

@@ -12,6 +12,7 @@ module gravier_material_filter
   contains
     procedure, non_overridable :: add => material_filter_add
     procedure, non_overridable :: lets_pass => material_filter_lets_pass
+    procedure, non_overridable :: find_passed => material_filter_find_passed
   end type material_filter_t
 
 contains
@@ -41,6 +42,23 @@ contains
     passes = min(a, b) > 0
     if (passes) passes = self%passes(a, b)
   end function material_filter_lets_pass
+
+  !> Which boundaries bodies of a material pass through.
+  pure subroutine material_filter_find_passed(self, material, boundaries, passed)
+    class(material_filter_t), intent(in) :: self
+    !> 0 for none
+    integer, intent(in) :: material
+    type(boundary_t), intent(in) :: boundaries(:)
+    !> (boundaries)
+    logical, intent(out) :: passed(:)
+    integer :: b
+
+    passed(:) = .false.
+    if (.not. allocated(self%passes) .or. material == 0) return
+    do b = 1, size(boundaries)
+      if (boundaries(b)%material > 0) passed(b) = self%passes(material, boundaries(b)%material)
+    end do
+  end subroutine material_filter_find_passed
 
   !> Number of the material of body `k` of a set, or of boundary -k; 0 for none. Grains glued to a boundary that has one are of its
   !> material.

@@ -64,7 +64,7 @@ contains
       & is_one_of_few(step)
   end function repartition_is_due
 
-  !> Whether a step is one of 16, 20, 24, 28, 32, 40, 48, 56, 64, 80 ...: four in each doubling.
+  !> Whether a number of steps made is one of 16, 20, 24, 28, 32, 40, 48, 56, 64, 80 ...: four in each doubling.
   pure logical function is_one_of_few(step) result(is)
     integer, intent(in) :: step
     integer :: n

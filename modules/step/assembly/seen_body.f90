@@ -11,8 +11,8 @@ module gravier_seen_body
 
   !> A body, seen from the centre of the candidate.
   type :: seen_body_t
-    !> number of its shape, 0 for a disk or a sphere
-    integer :: shape = 0
+    !> number of its shape, 0 for a disk or a sphere; of its material, for what is asked of boundaries, 0 for none
+    integer :: shape = 0, material = 0
     !> [m]
     real(dp) :: radius = 0.0_dp
     !> its centre (3) [m]

@@ -10,6 +10,7 @@ module gravier_shape_contacts
   use gravier_facet, only: near_facets_t, find_facet_normal
   use gravier_facet_contacts, only: facet_contacts_t, find_ball_contacts, find_polygon_contacts, find_polyhedron_contacts, &
     & keep_corners
+  use gravier_material_filter, only: material_of
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
   use gravier_seen_body, only: seen_body_t, see_body, turn_manifold, turn_vertex, turn_facets, turn_corners
@@ -103,6 +104,7 @@ contains
         call touch_body(decomposition%shapes, candidate, antagonist, work, points)
       else
         call see_body(bodies, i, candidate)
+        candidate%material = material_of(bodies, decomposition%boundaries, i)
         call touch_boundary(decomposition, candidate, bodies%position(:, i), -j, work, points)
       end if
       seam(:) = 0.0_dp
@@ -319,6 +321,7 @@ contains
     type(manifold_t), intent(inout) :: manifold
     type(nearest_t) :: near
     real(dp) :: edge(size(centre)), tolerance
+    logical :: passed(size(decomposition%boundaries))
 
     if (manifold%n == 0) return
     if (.not. sheet%leans_at_edge(manifold%normal)) return
@@ -326,7 +329,8 @@ contains
     if (near%overlap) return
     tolerance = one_place*a%radius*piece%rounding
     edge(:) = centre + near%point(1:size(centre)) - 0.5_dp*(near%gap + a%radius*piece%rounding)*near%normal(1:size(centre))
-    if (is_in_joint(decomposition%boundaries, sheet%boundary, edge, manifold%normal, tolerance, level)) &
+    call decomposition%rule%filter%find_passed(a%material, decomposition%boundaries, passed)
+    if (is_in_joint(decomposition%boundaries, sheet%boundary, edge, manifold%normal, tolerance, level, passed)) &
       & call keep_corners(sheet%corner, tolerance, level, manifold)
   end subroutine leave_joints
 

@@ -33,7 +33,7 @@ contains
 
   !> Whether a point at the edge of a boundary lies in a hollow of the wall: another segment, rectangle or mesh has the point, too,
   !> and rises from it along the normal. Such a point is no place of contact (theory.md, mesh walls).
-  logical function is_in_joint(boundaries, j, point, normal, tolerance, slack) result(in_joint)
+  logical function is_in_joint(boundaries, j, point, normal, tolerance, slack, passed) result(in_joint)
     type(boundary_t), intent(in) :: boundaries(:)
     !> the boundary of the edge
     integer, intent(in) :: j
@@ -41,6 +41,8 @@ contains
     real(dp), intent(in) :: point(:), normal(3)
     !> distance below which points are one [m]; sine of the slope below which a wall is flat
     real(dp), intent(in) :: tolerance, slack
+    !> (boundaries) those that the body passes through; none where absent
+    logical, intent(in), optional :: passed(:)
     logical :: has_it
     integer :: k
 
@@ -48,6 +50,9 @@ contains
     do k = 1, size(boundaries)
       if (in_joint) return
       if (k == j .or. .not. boundaries(k)%touches()) cycle
+      if (present(passed)) then
+        if (passed(k)) cycle
+      end if
       call meet_at(boundaries(k), point, normal, tolerance, slack, has_it, in_joint)
     end do
   end function is_in_joint

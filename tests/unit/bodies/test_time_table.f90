@@ -14,6 +14,7 @@ program test_time_table
   call test_repeating()
   call test_one_row()
   call test_variation()
+  call test_equal_rows()
   call test_turns()
   call test_many_rows()
   call test_refusals()
@@ -124,6 +125,23 @@ contains
     call check_close(table%kept_variation(0.5_dp, 8), 1.0_dp, 1.0e-12_dp, "a jump between two steps is kept")
     call check_close(table%kept_variation(0.5_dp, 40), 1.0_dp/3.0_dp, 1.0e-12_dp, "a dip between two steps is not")
   end subroutine test_variation
+
+  !> Between equal rows the value is theirs to the last bit, wherever it is asked for.
+  subroutine test_equal_rows()
+    real(dp), parameter :: held = -777.7_dp
+    type(error_t), allocatable :: error
+    integer :: k
+    logical :: same
+
+    call read_table("time,vx"//newline//"0,-777.7"//newline//"0.7,-777.7"//newline//"3,-777.7"//newline, error)
+    call check(.not. allocated(error), "equal rows")
+    if (allocated(error)) return
+    same = .true.
+    do k = 0, 300
+      same = same .and. .not. abs(table%at(1, 0.01_dp*k) - held) > 0.0_dp
+    end do
+    call check(same, "the value of equal rows, without rounding")
+  end subroutine test_equal_rows
 
   !> Times between turns: a square wave with flats, one turn alone, a cycle that begins anew, with one turn or three in it.
   subroutine test_turns()

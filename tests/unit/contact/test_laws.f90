@@ -538,12 +538,31 @@ contains
       call check(.not. filter%lets_pass(bodies, boundaries, 3, 3), "none: equal materials meet")
       call check(.not. filter%lets_pass(bodies, boundaries, 4, 3), "none: what has no material meets all")
       call check(filter%lets_pass(bodies, boundaries, 3, 5), "none: a glued grain")
+      call check_passed(filter, boundaries)
       call check(filter%lets_pass(bodies, boundaries, 2, -2), "none: a boundary")
       call check(.not. filter%lets_pass(bodies, boundaries, 3, -2), "none: a boundary of an equal material")
       call check(.not. filter%lets_pass(bodies, boundaries, 2, -1), "none: a boundary without a material")
     end associate
     call check_filter(bodies, boundaries)
   end subroutine check_none
+
+  !> The boundaries that bodies of a material pass through: of one without a material and one of material 3 the second, by bodies
+  !> of material 2 alone.
+  subroutine check_passed(filter, boundaries)
+    type(material_filter_t), intent(in) :: filter
+    type(boundary_t), intent(in) :: boundaries(2)
+    type(material_filter_t) :: none
+    logical :: passed(2)
+    integer :: material
+
+    do material = 0, 3
+      call filter%find_passed(material, boundaries, passed)
+      call check(.not. passed(1), "none: a boundary without a material is passed by nothing")
+      call check(passed(2) .eqv. material == 2, "none: a boundary that bodies pass through")
+    end do
+    call none%find_passed(2, boundaries, passed)
+    call check(.not. any(passed), "none: no law lets anything pass")
+  end subroutine check_passed
 
   !> A filter by itself: nothing passes until a pair is added.
   subroutine check_filter(bodies, boundaries)
