@@ -104,7 +104,8 @@ contains
         call touch_body(decomposition%shapes, candidate, antagonist, work, points)
       else
         call see_body(bodies, i, candidate)
-        candidate%material = material_of(bodies, decomposition%boundaries, i)
+        if (allocated(decomposition%rule%filter%passes)) &
+          & candidate%material = material_of(bodies, decomposition%boundaries, i)
         call touch_boundary(decomposition, candidate, bodies%position(:, i), -j, work, points)
       end if
       seam(:) = 0.0_dp
