@@ -325,11 +325,11 @@ contains
     real(dp), intent(in) :: looser_seconds(3)
     !> seconds of sweeps of the slowest rank over the mean
     real(dp), intent(in) :: slowest
-    character(len=:), allocatable :: text, evening
+    character(len=:), allocatable :: text, balancing
     real(dp) :: half, shared, lost, rest
 
     half = 0.5_dp*seconds
-    evening = evening_text(simulation%config%decomposition, (slowest - 1.0_dp)*phases(phase_sweep)/max(seconds, tiny(seconds)))
+    balancing = balancing_text(simulation%config%decomposition, (slowest - 1.0_dp)*phases(phase_sweep)/max(seconds, tiny(seconds)))
     shared = phases(phase_exchange) + phases(phase_factorise) + phases(phase_interface_solve) + phases(phase_reduction) + &
       & phases(phase_interface)
     associate (effort => simulation%effort, config => simulation%config)
@@ -339,8 +339,8 @@ contains
         text = to_text(simulation%comm%size - simulation%decomposition%n_subdomains)//" of "// &
           & to_text(simulation%comm%size)//" ranks own no subdomain and wait: choose as many &decomposition "// &
           & "subdomains as ranks, now "//to_text(simulation%decomposition%n_subdomains)//", or fewer ranks"
-      else if (evening /= "") then
-        text = evening
+      else if (balancing /= "") then
+        text = balancing
       else if (phases(phase_output) > half .and. config%output%every > 0 .and. config%output%every < config%time%steps) then
         text = "output takes most of the time: a larger &output every, now "//to_text(config%output%every)
       else if (phases(phase_diagnostics) > half) then
@@ -379,7 +379,7 @@ contains
   end function halving_text
 
   !> What evens out the work of the ranks where they wait for the slowest one; empty where they hardly wait, or nothing is known to.
-  pure function evening_text(config, waiting) result(text)
+  pure function balancing_text(config, waiting) result(text)
     type(decomposition_config_t), intent(in) :: config
     !> of the run that a rank waits in the mean
     real(dp), intent(in) :: waiting
@@ -396,7 +396,7 @@ contains
     if (.not. (by_graph .or. again)) text = text//" and "
     if (.not. again) text = text//"repartition_imbalance = 1.2"
     text = text//" divides the contacts more evenly"
-  end function evening_text
+  end function balancing_text
 
   !> Whether plain iterations are many and may be accelerated.
   logical function may_accelerate(simulation) result(may)

@@ -273,7 +273,7 @@ contains
       n = cell_components(simulation%decomposition%nd)
       turn = huge(turn)
       do k = n + 1, 2*n
-        if (drive%table%has(k)) turn = min(turn, drive%table%shortest_way(k))
+        if (drive%table%has(k)) turn = min(turn, drive%table%shortest_half_cycle(k))
       end do
       answers = turn/answer_time(simulation)
       if (.not. answers < least_answers) return

@@ -10,6 +10,7 @@ from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
 import gravier.joined_bodies as joined
+import gravier.linked_grains as linked
 from gravier.bodies_table import BodiesTable
 
 R = 0.01
@@ -123,14 +124,14 @@ class Joined(RunTestCase):
             depth = tables[0]["radius"][:, None] + tables[1]["radius"] - distance
             known += [(depth[i, j], i, j) for i, j in zip(*np.nonzero(depth > 0.01))]
         self.assertGreater(len(known), 30)
-        most = joined.MOST_PAIRS
+        most = linked.MOST_PAIRS
         try:
-            for joined.MOST_PAIRS in (1, 97, 2000000):
+            for linked.MOST_PAIRS in (1, 97, 2000000):
                 found = sorted(zip(*joined._overlaps(*tables, ways, 0.01)))
                 self.assertEqual([pair[1:] for pair in found], [pair[1:] for pair in sorted(known)])
                 np.testing.assert_allclose([pair[0] for pair in found], [pair[0] for pair in sorted(known)], rtol=1e-9)
         finally:
-            joined.MOST_PAIRS = most
+            linked.MOST_PAIRS = most
 
     def test_refusals(self):
         """One line each; no file is written, and those that are there stay."""

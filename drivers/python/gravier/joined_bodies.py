@@ -5,6 +5,7 @@ import numpy as np
 from whole_file import hdf5_file, whole_file
 
 from .bodies_table import BodiesTable
+from .linked_grains import pairs_of_ranges
 from .restarts import claim_bodies_file, make_parent
 from .results import BodiesFile
 from .shapes import ball
@@ -15,8 +16,6 @@ from .tables import ResultsError, Table
 PROGRAM = "gravier.join_bodies"
 #: overlap that is allowed unless told, in mean radii, as in a run; overlaps of less than the other part of two radii are rounding
 LARGEST, ROUNDING = 0.01, 1e-9
-#: pairs of bodies that are compared at a time
-MOST_PAIRS = 2000000
 
 
 def join_bodies(files, path, shift=None, above=None, overlap=None, density=None):
@@ -131,10 +130,7 @@ def _overlaps(part, other, ways, allowed):
             continue
         reach = part["radius"][mine] + radius.max()
         low, high = (np.searchsorted(there[:, 0], place[:, 0] + sign * reach) for sign in (-1.0, 1.0))
-        counts = high - low
-        for rows in np.split(np.arange(len(place)), np.flatnonzero(np.diff(np.cumsum(counts) // MOST_PAIRS)) + 1):
-            i = np.repeat(rows, counts[rows])
-            j = np.arange(len(i)) - np.repeat(np.cumsum(counts[rows]) - counts[rows], counts[rows]) + np.repeat(low[rows], counts[rows])
+        for i, j in pairs_of_ranges(low, high):
             both = part["radius"][mine[i]] + radius[j]
             depth = both - np.linalg.norm(place[i] - there[j], axis=1)
             deep = depth > allowed + ROUNDING * both

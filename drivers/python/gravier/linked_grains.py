@@ -4,7 +4,7 @@ import itertools
 import numpy as np
 
 #: pairs of grains that are compared at a time
-MOST_PAIRS = 4000000
+MOST_PAIRS = 2000000
 
 
 def near_pairs(position, radius, gap):
@@ -17,6 +17,14 @@ def near_pairs(position, radius, gap):
         among = np.flatnonzero(level <= chosen)
         found += _pairs_of_level(position[among], radius[among], level[among] == chosen, gap, among)
     return tuple(np.concatenate(rows) for rows in zip(*found))
+
+
+def pairs_of_ranges(low, high):
+    """Rows i, and the rows j from low[i] on that are below high[i], as pairs (i, j), about MOST_PAIRS at a time."""
+    counts = high - low
+    for rows in np.split(np.arange(len(counts)), np.flatnonzero(np.diff(np.cumsum(counts) // MOST_PAIRS)) + 1):
+        i = np.repeat(rows, counts[rows])
+        yield i, np.arange(len(i)) - np.repeat(np.cumsum(counts[rows]) - counts[rows], counts[rows]) + np.repeat(low[rows], counts[rows])
 
 
 def components(count, i, j):
@@ -44,11 +52,8 @@ def _pairs_of_level(position, radius, own, gap, number):
     # the cells beside each other along the last axis have keys after each other
     for offset in itertools.product((-1, 0, 1), repeat=position.shape[1] - 1):
         target = key[rows] + np.dot(offset, stride[:-1])
-        low, high = np.searchsorted(key, target - 1, "left"), np.searchsorted(key, target + 1, "right")
-        counts = high - low
-        for part in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(np.cumsum(counts) // MOST_PAIRS)) + 1):
-            i = np.repeat(rows[part], counts[part])
-            j = np.arange(len(i)) - np.repeat(np.cumsum(counts[part]) - counts[part], counts[part]) + np.repeat(low[part], counts[part])
+        for place, j in pairs_of_ranges(np.searchsorted(key, target - 1, "left"), np.searchsorted(key, target + 1, "right")):
+            i = rows[place]
             way = position[i] - position[j]
             near = (np.einsum("nd,nd->n", way, way) <= (radius[i] + radius[j] + gap)**2) & (i != j)
             found.append((number[i[near]], number[j[near]]))

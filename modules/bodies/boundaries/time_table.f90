@@ -25,7 +25,7 @@ module gravier_time_table
     procedure :: at => time_table_at
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
-    procedure :: shortest_way => time_table_shortest_way
+    procedure :: shortest_half_cycle => time_table_shortest_half_cycle
     procedure :: digest => time_table_digest
   end type time_table_t
 
@@ -278,7 +278,7 @@ contains
 
   !> Shortest time between two turns of a quantity, from a highest value to a lowest or back; huge where there are fewer than two.
   !> In a table that begins anew its first turn follows its last one [s].
-  pure real(dp) function time_table_shortest_way(self, column) result(shortest)
+  pure real(dp) function time_table_shortest_half_cycle(self, column) result(shortest)
     class(time_table_t), intent(in) :: self
     integer, intent(in) :: column
     real(dp) :: last, first, change
@@ -303,6 +303,6 @@ contains
     end do
     if (self%period > 0.0_dp .and. turns > 1) shortest = min(shortest, first + self%period - last)
     if (self%period > 0.0_dp .and. turns == 1) shortest = min(shortest, last - self%time(1), self%time(rows) - last)
-  end function time_table_shortest_way
+  end function time_table_shortest_half_cycle
 
 end module gravier_time_table

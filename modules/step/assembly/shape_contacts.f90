@@ -18,7 +18,7 @@ module gravier_shape_contacts
   use gravier_piece_meeting, only: room_t, nearest_t, meet_pieces, find_nearest_points
   use gravier_clear_path, only: clear_path
   use gravier_wall_joints, only: is_in_joint
-  use gravier_wall_sheet, only: wall_sheet_t, level
+  use gravier_wall_sheet, only: wall_sheet_t, level, leans
   use gravier_pair_points, only: pair_points_t
   implicit none
   private
@@ -251,7 +251,7 @@ contains
       real(dp) :: of_facet(3)
 
       call find_facet_normal(corners, of_facet)
-      if (norm2(manifold%normal - dot_product(manifold%normal, of_facet)*of_facet) <= level) return
+      if (.not. leans(manifold%normal, of_facet)) return
       call sheet%init(decomposition%boundaries(j), j, centre, corners)
       call leave_joints(decomposition, centre, piece, a, sheet, work, manifold)
       if (work%step > 0.0_dp) call clear_path(piece, sheet%piece, work%step, a, sheet%seen, work%ahead, manifold)

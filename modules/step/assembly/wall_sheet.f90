@@ -7,7 +7,7 @@ module gravier_wall_sheet
   use gravier_seen_body, only: seen_body_t
   implicit none
   private
-  public :: wall_sheet_t, level
+  public :: wall_sheet_t, level, leans
 
   !> sine of the slope of a wall at and below which it is level
   real(dp), parameter :: level = 1.0e-3_dp
@@ -54,8 +54,14 @@ contains
     class(wall_sheet_t), intent(in) :: self
     !> of the contact, a unit vector
     real(dp), intent(in) :: normal(3)
-    leans_at_edge = norm2(normal - dot_product(normal, self%normal)*self%normal) > level
+    leans_at_edge = leans(normal, self%normal)
   end function wall_sheet_leans_at_edge
+
+  !> Whether a unit vector leans from the normal of a wall, to whichever side it looks.
+  pure logical function leans(normal, of_wall)
+    real(dp), intent(in) :: normal(3), of_wall(3)
+    leans = norm2(normal - dot_product(normal, of_wall)*of_wall) > level
+  end function leans
 
   !> A segment, a triangle or a rectangle as a piece without rounding, with one face to either side.
   pure subroutine make_piece(nd, corners, sheet, seen)

@@ -172,7 +172,7 @@ contains
     call read_table(text//newline, error, repeats)
     call check(.not. allocated(error), name)
     if (allocated(error)) return
-    call check_close(table%shortest_way(1), time, 1.0e-12_dp*time, name)
+    call check_close(table%shortest_half_cycle(1), time, 1.0e-12_dp*time, name)
   end subroutine expect_turns
 
   !> More rows than there is room for at first: a square of the time, exact at rows, off by 1/4 between them.
