@@ -5,6 +5,7 @@ module gravier_command_line
   use gravier_narrow, only: narrow
   use gravier_errors, only: error_t, raise, status_input
   use gravier_number_text, only: read_integer, read_real
+  use gravier_restart, only: restart_t
   implicit none
   private
   public :: arguments_t, read_arguments, argument, option_value, positive_integer, positive_real, leave
@@ -16,6 +17,8 @@ module gravier_command_line
   character(len=*), parameter :: usage = &
     & "usage: gravier CASE.nml            run a case (mpirun -n RANKS gravier CASE.nml)"//nl// &
     & "       gravier --restart CASE.nml  go on from the checkpoint in its output directory, if there is one"//nl// &
+    & "       gravier --restart --changed CASE.nml"//nl// &
+    & "                                   the same with loads, drives and coefficients of contact that have changed"//nl// &
     & "       gravier --check CASE.nml    read and check it, say what a run would do, run nothing"//nl// &
     & "       gravier --keys              reference of all input keys, in Markdown"//nl// &
     & "       gravier --version | --help"//nl// &
@@ -23,8 +26,7 @@ module gravier_command_line
 
   type :: arguments_t
     integer :: action = action_run
-    !> go on from a checkpoint
-    logical :: restart = .false.
+    type(restart_t) :: restart
     !> the input file
     character(len=:), allocatable :: file
     !> the whole command line
@@ -59,7 +61,9 @@ contains
       case ("--check")
         arguments%action = action_check
       case ("--restart")
-        arguments%restart = .true.
+        arguments%restart%asked = .true.
+      case ("--changed")
+        arguments%restart%accepts = .true.
       case ("--help", "-h")
         arguments%action = action_help
       case ("--version")
@@ -77,9 +81,11 @@ contains
     end do
     if (arguments%action <= action_check .and. arguments%file == "") &
       & call raise(error, status_input, "no input file; see gravier --help")
-    if (arguments%action == action_check .and. arguments%restart) call raise(error, status_input, &
+    if (arguments%action == action_check .and. arguments%restart%asked) call raise(error, status_input, &
       & "--check beside --restart: --check looks at a run from its beginning, and what a restart refuses it refuses before it "// &
       & "changes a file; expected one of the two")
+    if (arguments%restart%accepts .and. .not. arguments%restart%asked) call raise(error, status_input, &
+      & "--changed without --restart: expected both, since a run that begins has nothing to differ from; see gravier --help")
     if (arguments%action == action_keys .and. arguments%file /= "") call raise(error, status_input, &
       & "an input file, "//arguments%file//", beside --keys, which shows the keys of every input file; see gravier --help")
   end subroutine read_arguments

@@ -9,6 +9,7 @@ module gravier_c_run
   use gravier_communicator, only: join_parallel, stop_parallel
   use gravier_solve_report, only: solve_converged
   use gravier_run_tally, only: relative_error
+  use gravier_restart, only: restart_t
   use gravier_user_loop, only: user_loop_t
   use gravier_c_handle, only: is_open, keep_open, forget_open, find_loop
   use gravier_c_text, only: told, text_of
@@ -18,7 +19,7 @@ module gravier_c_run
   public :: gravier_whole, gravier_real, gravier_sum, gravier_highest
 
   !> bits of the options of gravier_open
-  integer, parameter :: restart_bit = 0, quiet_bit = 1, forces_bit = 2
+  integer, parameter :: restart_bit = 0, quiet_bit = 1, forces_bit = 2, changed_bit = 3
 
   !> MPI was started here
   logical :: started = .false.
@@ -48,8 +49,9 @@ contains
       else
         call loop%comm%init()
       end if
-      if (.not. allocated(error)) call loop%open(text_of(path), text_of(command), btest(options, restart_bit), &
-        & btest(options, quiet_bit), btest(options, forces_bit), error)
+      if (.not. allocated(error)) call loop%open(text_of(path), text_of(command), &
+        & restart_t(btest(options, restart_bit), btest(options, changed_bit)), btest(options, quiet_bit), &
+        & btest(options, forces_bit), error)
       if (allocated(error)) then
         later = error
         if (loop%comm%alive) call loop%close(later)

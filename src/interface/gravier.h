@@ -16,8 +16,8 @@ extern "C" {
 typedef struct gravier_simulation gravier_simulation;
 
 /* options of gravier_open, to be added: go on from the checkpoint of the case, if there is one; the log goes to run.log alone; bodies have
- * forces that the loop applies */
-enum { GRAVIER_RESTART = 1, GRAVIER_QUIET = 2, GRAVIER_FORCES = 4 };
+ * forces that the loop applies; a restart takes loads, drives and coefficients of contact that the case has changed */
+enum { GRAVIER_RESTART = 1, GRAVIER_QUIET = 2, GRAVIER_FORCES = 4, GRAVIER_CHANGED = 8 };
 
 /* Open the run of an input file. `command` says in results.h5 who runs it. `communicator` points to the handle that MPI_Comm_c2f gives, or
  * is NULL for all ranks. MPI is started unless it runs. One run at a time is open in a process. Collective. */

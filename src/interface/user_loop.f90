@@ -11,6 +11,7 @@ module gravier_user_loop
   use gravier_signals, only: release_signals
   use gravier_body_store, only: body_set_t
   use gravier_contact_coefficients, only: coefficients_t
+  use gravier_restart, only: restart_t
   use gravier_open_run, only: open_run_t
   implicit none
   private
@@ -56,8 +57,9 @@ contains
     class(user_loop_t), target, intent(inout) :: self
     !> of the input file; who runs it, for the record
     character(len=*), intent(in) :: path, command
-    !> go on from the checkpoint of the case; the log goes to its file alone; bodies have forces that the loop applies
-    logical, intent(in) :: restart, quiet, forces
+    type(restart_t), intent(in) :: restart
+    !> the log goes to its file alone; bodies have forces that the loop applies
+    logical, intent(in) :: quiet, forces
     type(error_t), allocatable, intent(inout) :: error
     integer :: b, k
 

@@ -161,7 +161,7 @@ contains
       if (refinement%refined > 0) then
         text = "refined     "//counted(refinement%refined, "solve")//" aimed at less error than the goal, down to the "// &
           & goal_text(simulation, refinement%least_share)//", so that "
-        if (refinement%for_bonds < refinement%refined) text = text//"errors do not add up where nothing else moves"
+        if (refinement%for_bonds < refinement%refined) text = text//"errors do not add up where most bodies rest"
         if (refinement%for_bonds > 0 .and. refinement%for_bonds < refinement%refined) text = text//" and "
         if (refinement%for_bonds > 0) text = text//"bonds break where they should, in "//counted(refinement%for_bonds, "solve")
         text = text//"; "

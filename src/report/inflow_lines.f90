@@ -6,12 +6,15 @@ module gravier_inflow_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: inflow_warnings, entering_lines, population_lines
+  public :: inflow_warnings, entering_lines, population_lines, inflow_doubt
 
   character(len=*), parameter :: newline = new_line("a")
   !> fraction of a region that grains of about one radius fill which enter it as fast as they find places, in 2D and 3D: measured,
   !> from rest and with a velocity
   real(dp), parameter :: filled(2:3) = [0.45_dp, 0.27_dp]
+  !> part of the grains that are owed, and their number, up to which those that wait for a place are no fault
+  real(dp), parameter :: few_wait = 0.01_dp
+  integer(i8), parameter :: one_waits = 1
 
 contains
 
@@ -161,10 +164,33 @@ contains
     else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
       text = text//", all that its rate owes"
     end if
+    if (insertion%most_grains < huge(1_i8) .and. .not. insertion%is_complete()) text = text//"; its count is "// &
+      & to_text(insertion%most_grains)
     if (insertion%put_off > 0) text = text//"; grains were put off in "//counted(insertion%put_off, "step")
     if (insertion%held_back > 0) text = text//"; more than "//to_text(most_a_step)//" were to enter in "// &
       & counted(insertion%held_back, "step")
   end function insertion_line
+
+  !> That grains which rates owe have not entered, for the last words of a log; empty where they are few.
+  function inflow_doubt(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+    integer(i8) :: behind, entered
+    integer :: i
+
+    text = ""
+    behind = 0
+    entered = 0
+    do i = 1, size(simulation%inflow%insertions)
+      associate (insertion => simulation%inflow%insertions(i))
+        behind = behind + insertion%grains_behind(simulation%time) + &
+          & nint(insertion%mass_behind(simulation%time)/insertion%mean_mass(), i8)
+        entered = entered + insertion%entered
+      end associate
+    end do
+    if (behind <= one_waits .or. behind <= few_wait*(behind + entered)) return
+    text = "; "//to_text(behind)//" of the "//to_text(behind + entered)//" grains that rates of insertions owe have not entered"
+  end function inflow_doubt
 
   !> What keeps an insertion from its rate: full regions, the most that may enter in a step, or both.
   pure function why_behind(insertion, they) result(text)

@@ -11,6 +11,7 @@ module gravier_run_summary
   use gravier_config_types, only: decomposition_config_t
   use gravier_method_options, only: method_features_t, default_always
   use gravier_method_registry, only: features_of
+  use gravier_inflow_lines, only: inflow_doubt
   use gravier_simulation, only: simulation_t
   implicit none
   private
@@ -238,6 +239,7 @@ contains
       if (simulation%fast > 0) text = text//"; "//to_text(simulation%fast)//" times something moved too far for the step"
       if (simulation%fallen%number > 0) text = text//"; "//counted(simulation%fallen%number, "grain")// &
         & " had fallen below all boundaries"
+      text = text//inflow_doubt(simulation)
       if (simulation%restarted .and. tally%steps > 0) text = text//"; errors and overlaps are those since the restart"
     end associate
   end function verdict_text

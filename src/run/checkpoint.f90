@@ -59,7 +59,7 @@ contains
       end associate
     end do
     text = text//"regions: "//samples_record//newline
-    text = text//"lists: largest_extent_when_listed, corner_of_orders"//newline
+    text = text//"layout: degrees_of_freedom"//newline//"lists: largest_extent_when_listed, corner_of_orders"//newline
     text = text//"files: names"//newline//"loop: names of settings"//newline
     text = text//"partition: "//head_record//", "//to_text(head_words)//" words; division"
   end function records_text
@@ -122,6 +122,7 @@ contains
       call file%write_scalar("law_row", int(memory%law_row, i8), error)
       call file%write_scalar("touch_row", int(memory%touch_row, i8), error)
       call file%write_scalar("may_sleep", int(simulation%decomposition%nr, i8), error)
+      call file%write_scalar("degrees_of_freedom", int(simulation%decomposition%nv, i8), error)
       call file%write_scalar("key_row", int(memory%key_row, i8), error)
     end associate
     call file%write_scalar("imbalance", simulation%imbalance, error)
@@ -147,9 +148,11 @@ contains
 
   !> Take the state of a checkpoint into a simulation that was made from the same scene. Failure: status_input, with file
   !> and what does not fit. Collective; errors are the same on all ranks.
-  subroutine load_checkpoint(simulation, path, error)
+  subroutine load_checkpoint(simulation, path, accepts, error)
     type(simulation_t), intent(inout) :: simulation
     character(len=*), intent(in) :: path
+    !> loads, drives and coefficients of contact may be others
+    logical, intent(in) :: accepts
     type(error_t), allocatable, intent(inout) :: error
     type(checkpoint_file_t) :: file
     integer(i8) :: step, last_written, builds, quiet
@@ -160,7 +163,7 @@ contains
 
     if (allocated(error)) return
     call file%open(simulation%comm, path, records_text(), error)
-    call check_scene(simulation, file, path, error)
+    call check_scene(simulation, file, path, accepts, error)
     call file%read_scalar("step", step, error)
     call check_steps(simulation, step, path, error)
     call file%read_text("files", simulation%files, error)
@@ -209,13 +212,14 @@ contains
     simulation%step = own_step
     simulation%last_written = own_last - 1
     ! steps that were at rest by another measure do not count
-    if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp) simulation%quiet = own_quiet
+    if (.not. abs(rest_energy - simulation%rest_energy) > 0.0_dp .and. simulation%changes == "") simulation%quiet = own_quiet
     simulation%restarted = .true.
     simulation%division%overdue = division /= simulation%division%text() .and. simulation%division%subdomains > 1
     simulation%set_before = text_from(simulation%set_before, len(settings_mark) + 1)
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)
     call load_grains(simulation, file, path, builds, error)
+    if (.not. allocated(error) .and. simulation%changes /= "") call simulation%wake()
     if (.not. allocated(error)) call simulation%start_diagnostics()
     call load_diagnostics(simulation%diagnostics, file, error)
     call load_samples(simulation%diagnostics, file, error)

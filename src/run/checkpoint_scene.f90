@@ -6,6 +6,7 @@ module gravier_checkpoint_scene
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_shape_names, only: library_digest
   use gravier_time_table, only: time_table_t
+  use gravier_changed_options, only: compare_options, next_line, group_end, tables_group, files_group
   use gravier_config, only: write_active
   use gravier_simulation, only: simulation_t
   implicit none
@@ -13,18 +14,19 @@ module gravier_checkpoint_scene
   public :: check_scene, check_steps, fixed_options
 
   character(len=*), parameter :: newline = achar(10)
-  !> in a line that tells contents of a file apart: before its path and behind it
-  character(len=*), parameter :: contents_of = "contents of ", digest_mark = ", digest "
-  !> groups of the input that a run must go on with as it began
+  !> groups of the input that a run goes on with as it began, but for what may change where this is asked for
   character(len=*), parameter :: fixed_groups = "&scene &boundary &sample &insertion &material &law"
 
 contains
 
   !> Refuse a checkpoint of another scene, naming the first option that differs.
-  subroutine check_scene(simulation, file, path, error)
-    type(simulation_t), intent(in) :: simulation
+  subroutine check_scene(simulation, file, path, accepts, error)
+    !> gets the options that differ
+    type(simulation_t), intent(inout) :: simulation
     type(checkpoint_file_t), intent(in) :: file
     character(len=*), intent(in) :: path
+    !> loads, drives and coefficients of contact may differ
+    logical, intent(in) :: accepts
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: before
     integer(i8) :: subdomains, grains
@@ -41,7 +43,8 @@ contains
       call expect(subdomains == config%decomposition%subdomains, "&decomposition subdomains", to_text(subdomains))
       call expect(.not. abs(h - config%time%step) > 0.0_dp, "&time step", to_text(h))
       call expect(.not. abs(theta - config%time%theta) > 0.0_dp, "&time theta", to_text(theta))
-      if (.not. allocated(error)) call compare_options(path, before, fixed_options(simulation), config%file, error)
+      if (.not. allocated(error)) call compare_options(path, before, config%file, &
+        & fixed_options(simulation), accepts, simulation%changes, error)
     end associate
     if (allocated(error)) return
     if (grains /= simulation%n_first .or. abs(radius - simulation%decomposition%rule%mean_radius) > 0.0_dp) call raise(error, &
@@ -73,53 +76,11 @@ contains
       & ": expected "//to_text(step)//" at least, the step of "//path)
   end subroutine check_steps
 
-  !> Fails at the first line that differs between the options of a checkpoint and those of now.
-  subroutine compare_options(path, before, now, input, error)
-    character(len=*), intent(in) :: path, before, now, input
-    type(error_t), allocatable, intent(inout) :: error
-    character(len=:), allocatable :: line_before, line_now
-    integer :: at_before, at_now, named
-
-    at_before = 1
-    at_now = 1
-    do while (at_before <= len(before) .or. at_now <= len(now))
-      call next_line(before, at_before, line_before)
-      call next_line(now, at_now, line_now)
-      if (line_before == line_now) cycle
-      named = index(line_now, digest_mark)
-      if (index(line_now, contents_of) == 1 .and. index(line_before, line_now(1:named)) == 1) then
-        call raise(error, status_input, input//": "//line_now(1:named - 1)//" are not those with which "//path// &
-          & " was written: expected the file as it was then")
-        return
-      end if
-      call raise(error, status_input, input//": the scene is not that of "//path//": "//trim(adjustl(line_now))// &
-        & ": expected "//trim(adjustl(line_before))// &
-        & ", or a new run that begins with a state of this one: its final_bodies.h5, or a file of gravier.write_bodies")
-      return
-    end do
-  end subroutine compare_options
-
-  pure subroutine next_line(text, at, line)
-    character(len=*), intent(in) :: text
-    integer, intent(inout) :: at
-    character(len=:), allocatable, intent(out) :: line
-    integer :: length
-
-    if (at > len(text)) then
-      line = "(nothing)"
-      return
-    end if
-    length = index(text(at:), newline) - 1
-    if (length < 0) length = len(text) - at + 1
-    line = text(at:at + length - 1)
-    at = at + length + 1
-  end subroutine next_line
-
   !> The options in force that must not change, a line each, and what tells contents of tables and meshes apart.
   function fixed_options(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
-    type(growing_text_t) :: lines
+    type(growing_text_t) :: lines, tables, files
     character(len=:), allocatable :: options, line
     integer :: at, b
     logical :: fixed
@@ -134,20 +95,21 @@ contains
       if (index(line, "  title = ") == 1 .or. index(line, "  start_overlap = ") == 1) cycle
       if (fixed) call lines%add(line//newline)
     end do
-    if (simulation%decomposition%shapes%n > 0) call add_contents(trim(simulation%config%scene%shapes), &
+    if (simulation%decomposition%shapes%n > 0) call add_contents(files, trim(simulation%config%scene%shapes), &
       & library_digest(simulation%decomposition%shapes))
     do b = 1, size(simulation%inflow%insertions)
-      if (simulation%config%insertions(b)%radii == "table") call add_contents(trim(simulation%config%insertions(b)%radius_table), &
-        & simulation%inflow%insertions(b)%radii%digest())
+      if (simulation%config%insertions(b)%radii == "table") call add_contents(files, &
+        & trim(simulation%config%insertions(b)%radius_table), simulation%inflow%insertions(b)%radii%digest())
     end do
     call add_table(simulation%gravity_table, trim(simulation%config%scene%gravity_table))
     call add_table(simulation%cell_drive%table, trim(simulation%config%scene%cell_table))
     do b = 1, size(simulation%config%boundaries)
       associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))
         call add_table(boundary%drive%table, trim(given%table))
-        if (boundary%is_faceted()) call add_contents(trim(given%file), boundary%surface%digest())
+        if (boundary%is_faceted()) call add_contents(files, trim(given%file), boundary%surface%digest())
       end associate
     end do
+    call lines%add(tables_group//newline//tables%get()//group_end//newline//files_group//newline//files%get()//group_end//newline)
     text = lines%get()
 
   contains
@@ -156,14 +118,15 @@ contains
       type(time_table_t), intent(in) :: table
       character(len=*), intent(in) :: path
 
-      if (allocated(table%has)) call add_contents(path, table%digest())
+      if (allocated(table%has)) call add_contents(tables, path, table%digest())
     end subroutine add_table
 
-    subroutine add_contents(path, digest)
+    subroutine add_contents(kind, path, digest)
+      type(growing_text_t), intent(inout) :: kind
       character(len=*), intent(in) :: path
       integer(i8), intent(in) :: digest
 
-      call lines%add(contents_of//path//digest_mark//to_text(digest)//newline)
+      call kind%add("  "//path//" = "//to_text(digest)//newline)
     end subroutine add_contents
 
   end function fixed_options

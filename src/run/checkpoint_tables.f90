@@ -6,7 +6,8 @@ module gravier_checkpoint_tables
   use gravier_periodic, only: period_words
   use gravier_checkpoint_file, only: checkpoint_file_t
   use gravier_narrow, only: narrow, take_count
-  use gravier_body_store, only: body_layout_t, place_word
+  use gravier_shape_library, only: shape_library_t
+  use gravier_body_store, only: body_layout_t, body_set_t, place_word
   use gravier_boundary, only: boundary_t, boundary_words
   use gravier_neighbour_list, only: pair_memory_t
   use gravier_impulse_memory, only: list_impulses, match_impulses
@@ -156,8 +157,7 @@ contains
     integer(i8), intent(in) :: builds
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: records(:, :), counts(:), words(:), now(:), cell(:), corner(:)
-    integer(i8) :: may_sleep
-    type(body_layout_t) :: layout
+    type(body_layout_t) :: layout, kept
     real(dp) :: least_extent
     integer :: s, k, n, d, nd, n_words, n_boundary
 
@@ -166,13 +166,9 @@ contains
       layout = decomposition%layout()
       n_words = layout%record_words()
       n_boundary = boundary_words*size(decomposition%boundaries)
-      call file%read_scalar("may_sleep", may_sleep, error)
-      if (.not. allocated(error) .and. (may_sleep < 0 .or. may_sleep > 1)) call raise(error, status_input, path// &
-        & ": may_sleep: 0 or 1 was expected: the file is damaged")
-      if (allocated(error)) may_sleep = layout%nr
-      call file%read_table("grains", decomposition%n_subdomains, n_words + nd + 1 + &
-        & layout%rest_words()*(narrow(may_sleep) - layout%nr), records, counts, error)
-      if (.not. allocated(error)) call fit_rest(narrow(may_sleep), layout, records)
+      call read_layout(simulation, file, path, kept, error)
+      call file%read_table("grains", decomposition%n_subdomains, kept%saved_words() + nd + 1, records, counts, error)
+      if (.not. allocated(error)) call refit(kept, layout, nd + 1, records)
       call file%read_scalar("largest_extent_when_listed", least_extent, error)
       call file%read_array("corner_of_orders", 3, 3, corner, error)
       if (.not. allocated(error)) call check_reals(path//": the array corner_of_orders", corner, error)
@@ -189,7 +185,7 @@ contains
       do s = 1, size(decomposition%owned)
         call decomposition%owned(s)%init(decomposition%layout(), narrow(counts(s)))
         do k = 1, decomposition%owned(s)%n
-          call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
+          call take_grain(records(1:n_words, n + k), layout%nv > kept%nv, decomposition%shapes, decomposition%owned(s), k)
           ! lists ask for the speed that there was
           decomposition%owned(s)%velocity(:, k) = 0.0_dp
           decomposition%owned(s)%velocity(1, k) = transfer(records(n_words + nd + 1, n + k), 0.0_dp)
@@ -209,7 +205,7 @@ contains
       n = 0
       do s = 1, size(decomposition%owned)
         do k = 1, decomposition%owned(s)%n
-          call decomposition%owned(s)%set_record(k, records(1:n_words, n + k))
+          call take_grain(records(1:n_words, n + k), layout%nv > kept%nv, decomposition%shapes, decomposition%owned(s), k)
           do d = 1, nd
             decomposition%owned(s)%position(d, k) = transfer(records(n_words + d, n + k), 0.0_dp)
           end do
@@ -221,25 +217,65 @@ contains
     end associate
   end subroutine load_grains
 
-  !> Give grains that could not sleep the words of grains that can, of grains that are awake; or take these words away.
-  subroutine fit_rest(may_sleep, layout, records)
-    !> 1 where the grains of the file could sleep, else 0
-    integer, intent(in) :: may_sleep
-    type(body_layout_t), intent(in) :: layout
+  !> Grain `k` of a subdomain, from its record.
+  pure subroutine take_grain(record, turns_now, shapes, bodies, k)
+    integer(i8), intent(in) :: record(:)
+    !> it did not turn before, so that its record has no moment of inertia
+    logical, intent(in) :: turns_now
+    type(shape_library_t), intent(in) :: shapes
+    type(body_set_t), intent(inout) :: bodies
+    integer, intent(in) :: k
+
+    call bodies%set_record(k, record)
+    if (turns_now) bodies%inertia(k) = shapes%inertia(0, bodies%nd, bodies%radius(k), bodies%mass(k))
+  end subroutine take_grain
+
+  !> The layout of the grains of a checkpoint, which may sleep or turn where those of the scene do not, or the other way round.
+  subroutine read_layout(simulation, file, path, kept, error)
+    type(simulation_t), intent(in) :: simulation
+    type(checkpoint_file_t), intent(in) :: file
+    character(len=*), intent(in) :: path
+    type(body_layout_t), intent(out) :: kept
+    type(error_t), allocatable, intent(inout) :: error
+    integer(i8) :: may_sleep, freedoms
+    integer :: nd
+
+    kept = simulation%decomposition%layout()
+    nd = kept%nd
+    call file%read_scalar("may_sleep", may_sleep, error)
+    call file%read_scalar("degrees_of_freedom", freedoms, error)
+    if (allocated(error)) return
+    if (may_sleep < 0 .or. may_sleep > 1) call raise(error, status_input, path// &
+      & ": may_sleep: 0 or 1 was expected: the file is damaged")
+    if (freedoms /= nd .and. freedoms /= 3*nd - 3) call raise(error, status_input, path//": degrees_of_freedom: "// &
+      & to_text(nd)//" or "//to_text(3*nd - 3)//" was expected: the file is damaged")
+    if (allocated(error)) return
+    if (freedoms > kept%nv) call raise(error, status_input, simulation%config%file//": no grain turns without friction, and "// &
+      & "those of "//path//" turn: expected a friction above 0 of some contacts, however small")
+    kept%nr = narrow(may_sleep)
+    kept%nv = narrow(freedoms)
+  end subroutine read_layout
+
+  !> Give records of grains the words of another layout; what follows them stays.
+  subroutine refit(kept, layout, more, records)
+    type(body_layout_t), intent(in) :: kept, layout
+    !> words behind those of a grain
+    integer, intent(in) :: more
     !> (words of a grain and more, grains)
     integer(i8), allocatable, intent(inout) :: records(:, :)
     integer(i8), allocatable :: fitted(:, :)
-    integer :: before, more
+    integer :: k, before, now
 
-    if (may_sleep == layout%nr) return
-    ! the words of the rest are the last ones of a grain
-    before = layout%saved_words() - layout%rest_words()*layout%nr
-    more = size(records, 1) - before - layout%rest_words()*may_sleep
-    allocate (fitted(before + layout%rest_words()*layout%nr + more, size(records, 2)), source=0_i8)
-    fitted(1:before, :) = records(1:before, :)
-    fitted(before + layout%rest_words()*layout%nr + 1:, :) = records(before + layout%rest_words()*may_sleep + 1:, :)
+    before = kept%saved_words()
+    now = layout%saved_words()
+    if (before == now) return
+    allocate (fitted(now + more, size(records, 2)))
+    do k = 1, size(records, 2)
+      call layout%refit(kept, records(1:before, k), fitted(1:now, k))
+      fitted(now + 1:, k) = records(before + 1:, k)
+    end do
     call move_alloc(fitted, records)
-  end subroutine fit_rest
+  end subroutine refit
 
   !> Refuse grains of a file that no scene has. Errors may differ between ranks.
   subroutine check_grains(simulation, path, records, error)

@@ -17,6 +17,7 @@ module gravier_open_run
   use gravier_solve_report, only: solve_converged, solve_diverged
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
+  use gravier_restart, only: restart_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_scene_scales, only: scene_scales_t
   use gravier_start_overlap, only: check_start_overlap
@@ -85,8 +86,7 @@ contains
     character(len=*), intent(in) :: path
     !> the command line, for the record
     character(len=*), intent(in) :: command
-    !> go on from the checkpoint in the output directory, if there is one
-    logical, intent(in) :: restart
+    type(restart_t), intent(in) :: restart
     type(error_t), allocatable, intent(inout) :: error
     !> the log goes to its file alone
     logical, intent(in), optional :: quiet
@@ -100,16 +100,16 @@ contains
     call self%log%init(comm, quiet)
     call read_config(comm, path, config, error)
     call check_paths(comm, config, error)
-    if (.not. restart) call check_origins(comm, config, "", error)
+    if (.not. restart%asked) call check_origins(comm, config, "", error)
     allocate (grains)
     if (.not. allocated(error)) call self%simulation%make(comm, config, grains, error)
     ! a restart reads what another run may still write, a run that begins may be refused before there is a directory
-    if (restart) call claim_directory(comm, config, command, self%lock, error)
+    if (restart%asked) call claim_directory(comm, config, command, self%lock, error)
     if (.not. allocated(error)) call start(self%simulation, grains, restart, error)
-    if (restart .and. .not. allocated(error)) call check_origins(comm, config, self%simulation%files, error)
+    if (restart%asked .and. .not. allocated(error)) call check_origins(comm, config, self%simulation%files, error)
     ! what they took is for the steps
     deallocate (grains)
-    if (.not. restart) call claim_directory(comm, config, command, self%lock, error)
+    if (.not. restart%asked) call claim_directory(comm, config, command, self%lock, error)
     if (allocated(error)) return
     self%is_made = .true.
     older = ""
@@ -118,7 +118,7 @@ contains
     call self%output%open(self%simulation, command, error)
     if (allocated(error)) return
     call self%simulation%note_files(own_files(config))
-    call write_beginning(self%simulation, self%log, restart, self%lock%unknown, older, error)
+    call write_beginning(self%simulation, self%log, restart%asked, self%lock%unknown, older, error)
     if (allocated(error)) return
     self%is_open = .true.
     self%interruption%first_step = MPI_Wtime()
@@ -146,16 +146,26 @@ contains
     !> each with its newline
     character(len=*), intent(in) :: lines
     type(error_t), allocatable, intent(inout) :: error
+
+    call write_lines(self%log, lines, error)
+    call self%simulation%comm%agree(error)
+  end subroutine open_run_tell
+
+  !> Write lines into a log.
+  subroutine write_lines(log, lines, error)
+    type(run_log_t), intent(inout) :: log
+    !> each with its newline
+    character(len=*), intent(in) :: lines
+    type(error_t), allocatable, intent(inout) :: error
     integer :: first, last
 
     first = 1
     do while (first <= len(lines))
       last = first + index(lines(first:), new_line("a")) - 2
-      call self%log%line(lines(first:last), error)
+      call log%line(lines(first:last), error)
       first = last + 2
     end do
-    call self%simulation%comm%agree(error)
-  end subroutine open_run_tell
+  end subroutine write_lines
 
   !> Make one step and write what is due then. After an error, which is the same on all ranks, the run is to be finished.
   !> Collective.
@@ -309,6 +319,7 @@ contains
     if (older /= "") call log%line("warning     "//directory//" holds files of an older run, which stay as they are: "// &
       & older, error)
     if (restart) call log%write_restart(simulation, error)
+    call write_lines(log, simulation%changes, error)
     if (simulation%set_before /= "") call log%line("warning     a loop had set: "//simulation%set_before// &
       & ". What the case has instead acts from here on, until it is set again", error)
     call log%write_head(error)
@@ -320,16 +331,16 @@ contains
   subroutine start(simulation, grains, restart, error)
     type(simulation_t), intent(inout) :: simulation
     type(body_set_t), intent(in) :: grains
-    logical, intent(in) :: restart
+    type(restart_t), intent(in) :: restart
     type(error_t), allocatable, intent(inout) :: error
     character(len=:), allocatable :: path
     logical :: exists
 
     path = trim(simulation%config%output%directory)//"/"//checkpoint_name
     exists = .false.
-    if (restart .and. simulation%comm%rank == 0) inquire (file=path, exist=exists)
+    if (restart%asked .and. simulation%comm%rank == 0) inquire (file=path, exist=exists)
     if (simulation%comm%any_true(exists)) then
-      call load_checkpoint(simulation, path, error)
+      call load_checkpoint(simulation, path, restart%accepts, error)
       simulation%given = given_contacts_t()
     else
       call simulation%start(grains, error)

@@ -7,6 +7,7 @@ module gravier_run
   use gravier_communicator, only: communicator_t
   use gravier_config, only: config_t
   use gravier_read_case, only: read_config
+  use gravier_restart, only: restart_t
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_scale_report, only: fast_warning
   use gravier_scene_scales, only: scene_scales_t
@@ -28,8 +29,7 @@ contains
     character(len=*), intent(in) :: path
     !> the command line, for the record
     character(len=*), intent(in) :: command
-    !> go on from the checkpoint in the output directory, if there is one
-    logical, intent(in) :: restart
+    type(restart_t), intent(in) :: restart
     !> status_ok, or status_unconverged where a solve missed its tolerance
     integer, intent(out) :: status
     type(error_t), allocatable, intent(inout) :: error

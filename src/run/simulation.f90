@@ -38,6 +38,8 @@ module gravier_simulation
   !> the farthest way that neighbour lists leave fast bodies to go, over the mean radius: beyond it more pairs cost more than fewer
   !> lists save
   real(dp), parameter :: most_travel = 0.5_dp
+  !> in which rates outweigh all bounds on the grains that enter [s]
+  real(dp), parameter :: long_run = 1.0e12_dp
 
   type, extends(time_stepper_t) :: simulation_t
     !> of the grains as the run begins; of disks and spheres the mean radius [m]
@@ -65,6 +67,8 @@ module gravier_simulation
     !> what a loop of the user's own has set since the run began or went on from a checkpoint, and what it had set before that, and
     !> no checkpoint keeps; with commas between
     character(len=:), allocatable :: set_by_loop, set_before
+    !> options of the case that are others than those of the checkpoint that the run goes on from, a line each
+    character(len=:), allocatable :: changes
   contains
     procedure :: init => simulation_init
     procedure :: make => simulation_make
@@ -213,9 +217,10 @@ contains
         self%decomposition%entry_box(d, 2) = maxval(insertions%upper(d))
       end do
       if (self%velocity_scale%mass > 0.0_dp) return
-      ! the mean of all that are to enter, or of one grain of each insertion where their numbers have no bound
+      ! the mean of all that enter in the long run, whatever the number of steps is: rates without an end outweigh all bounds, and one
+      ! grain of each insertion counts where one has neither a rate nor a bound
       do d = 1, size(insertions)
-        share(d) = insertions(d)%planned(self%config%time%steps*self%physics%h)
+        share(d) = insertions(d)%planned(long_run)
       end do
       if (.not. (maxval(share) > 0.0_dp .and. maxval(share) < huge(1.0_dp))) share(:) = 1.0_dp
       share(:) = share/sum(share)
@@ -356,6 +361,7 @@ contains
     self%files = ""
     self%set_by_loop = ""
     self%set_before = ""
+    self%changes = ""
   end subroutine simulation_free
 
   !> Remember the files that the run has from now on, beside those that it had before a restart.

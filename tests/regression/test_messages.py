@@ -172,7 +172,8 @@ class Messages(RunTestCase):
         write(self.here("case.nml"), namelist(CASE))
         self.run_program("case.nml", status=0)
         for change, words in (({"time": {"step": 2e-3}}, ("&time step", "expected 1.0")), ({"time": {"theta": 1.0}}, ("&time theta", "expected 5.0")),
-                              ({"scene": {"friction": 0.7}}, ("the scene is not that of", "expected", "final_bodies.h5, or a file of gravier.write_bodies")),
+                              ({"scene": {"rotation": False}}, ("the scene is not that of", "expected", "final_bodies.h5, or a file of gravier.write_bodies")),
+                              ({"scene": {"friction": 0.7}}, ("the scene is not that of", "expected", "gravier --restart --changed, which goes on with the new value")),
                               ({"time": {"steps": 1}}, ("steps",))):
             self.refuse(namelist(merged(CASE, change)), *words, arguments=("--restart",))
         for spoil, words in ((lambda steps: steps.move("1", "first"), ('/steps: a member "first"', "numbers of steps were expected")),

@@ -10,6 +10,8 @@ import numpy as np
 from gravier_runs import LONG, RunTestCase, contents, differences, gravier, merged, namelist, read_csv, run_case, write
 from shaped_scenes import LIBRARY
 
+from gravier import Run
+
 H = 1e-3
 BIN = [{"name": "floor", "shape": "plane", "point": [0.0, 0.0], "normal": [0.0, 1.0]},
        {"name": "left", "shape": "plane", "point": [0.0, 0.0], "normal": [1.0, 0.0]},
@@ -169,7 +171,8 @@ class Insertion(RunTestCase):
         whole, part = self.here("whole"), self.here("part")
         run = run_case(crowded, directory=whole)
         self.assert_status(run, 0)
-        self.assertRegex(run.stdout, r"\*\*\* \d+ fewer than its rate owes: they found no place; grains were put off in \d+ steps")
+        self.assertRegex(run.stdout, r"\*\*\* \d+ fewer than its rate owes: they found no place;( its count is \d+;)? grains were put off in \d+ steps")
+        self.assertRegex(run.stdout, r"finished    all \d+ steps reached the accuracy.*; \d+ of the \d+ grains that rates of insertions owe have not entered; ")
         self.assert_status(run_case(merged(crowded, {"time": {"steps": 131}, "output": {"checkpoint_every": 131}}), directory=part), 0)
         write(os.path.join(part, "case.nml"), namelist(crowded))
         self.assert_status(gravier("--restart", "case.nml", ranks=2, directory=part), 0)
@@ -272,8 +275,23 @@ class Insertion(RunTestCase):
         full = run_case(merged(case, {"insertion": [{**feed, "rate": 200.0, "count": 50}]}), directory=self.here("full"))
         self.assert_status(full, 0)
         self.assertRegex(full.stdout, r"at rest     after step \d+ of 2500: .* J in 10 steps, and grains that are still to enter found no place\n")
+        self.assertRegex(full.stdout, r"insertion   'feed': \d+ grains of \S+ kg entered, \*\*\* \d+ fewer than its rate owes: they found no place; its count is 50; grains")
+        # what the last words doubt
+        self.assertRegex(" ".join(Run(full.path("results")).doubts()), r"^\d+ of the 50 grains that rates of insertions owe have not entered$")
+        self.assertEqual(Run(full.path("results")).verdict(), "converged with doubts")
         entered, energy = (np.array(full.history()[name]) for name in ("entered", "kinetic_translation"))
         self.assertTrue((energy[-10:] <= 1e-3).all() and not entered[-10:].any())
+
+    def test_steps_to_come_change_nothing(self):
+        """A scene that two insertions of different grains fill makes the same steps however many are to follow."""
+        feeds = [{"name": "fine", "lower": [0.02, 0.1], "upper": [0.1, 0.16], "rate": 400.0, "count": 40, "radius": 0.004},
+                 {"name": "coarse", "lower": [0.02, 0.2], "upper": [0.1, 0.26], "rate": 200.0, "count": 20, "radius": 0.008, "start": 0.03}]
+        case = merged(POUR, {"insertion": feeds, "time": {"steps": 150}, "output": {"every": 0}})
+        short = run_case(case, directory=self.here("short"))
+        longer = run_case(merged(case, {"time": {"steps": 400}}), directory=self.here("longer"))
+        for name, column in short.history().items():
+            if "seconds" not in name:
+                np.testing.assert_array_equal(column, longer.history()[name][:150], name)
 
     def test_start_and_end(self):
         run = run_case(changed(start=0.05, end=0.1), directory=self.here("times"))

@@ -18,7 +18,7 @@ from .arrays import plain, read_only, reals
 from .library import SimulationError, call, load
 from .scene_parts import Boundaries, Cell
 
-RESTART, QUIET, FORCES = 1, 2, 4
+RESTART, QUIET, FORCES, CHANGED = 1, 2, 4, 8
 KINDS = {0: "<f8", 1: "<i8", 2: "<i4"}
 
 
@@ -154,8 +154,9 @@ class Bodies:
 
 
 class Simulation:
-    """A run that is open. `restart` goes on from the checkpoint of the case, `quiet` keeps the log off the terminal, `forces` gives bodies an
-    array `force` [N]; `communicator` is one of mpi4py. All ranks of it make the same calls."""
+    """A run that is open. `restart` goes on from the checkpoint of the case, and `changed` beside it takes loads, drives and coefficients of contact
+    that the case has changed since; `quiet` keeps the log off the terminal, `forces` gives bodies an array `force` [N]; `communicator` is one of
+    mpi4py. All ranks of it make the same calls."""
 
     # a name that is misspelt is refused
     __slots__ = ("mark", "status", "dimension", "rank", "ranks", "_made", "subdomains", "bodies", "boundaries", "_handle", "__weakref__")
@@ -163,7 +164,7 @@ class Simulation:
     #: the one that is open in this process
     _open = None
 
-    def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None):
+    def __init__(self, case, restart=False, quiet=False, forces=False, communicator=None, changed=False):
         #: counts steps: arrays of bodies are of one of them
         self.mark = 0
         #: exit status of the program for such a run, once it is closed
@@ -171,7 +172,7 @@ class Simulation:
         #: rank of this process, from 0, and number of ranks
         self.rank, self.ranks = 0, 1
         self._handle = ctypes.c_void_p()
-        options = RESTART * bool(restart) + QUIET * bool(quiet) + FORCES * bool(forces)
+        options = RESTART * bool(restart) + QUIET * bool(quiet) + FORCES * bool(forces) + CHANGED * bool(changed)
         number = None if communicator is None else ctypes.pointer(ctypes.c_int(communicator.py2f()))
         command = " ".join(["gravier.Simulation", *sys.argv]).encode(errors="replace")
         try:

@@ -10,7 +10,7 @@ module gravier_contact_branch
 contains
 
   !> The branch of contact `c`, that part of it which lies outside boundaries, from the antagonist to the candidate [m]. Of disks
-  !> and spheres it is along the normal.
+  !> and spheres it is along the normal. Arms end in the middle of the gap, and branches on the surface of a boundary.
   pure subroutine find_branch(kernels, sub, c, branch)
     type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
@@ -23,6 +23,8 @@ contains
     if (kernels%row%arm_i > 0) then
       call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
       branch(:) = arm_j - arm_i
+      if (maxval(sub%pair(:, c)) > sub%n_grains) &
+        & branch(:) = branch + 0.5_dp*sub%gap(c)*sub%hot(lane_of(c), 1:kernels%nd, block_of(c))
       return
     end if
     length = sub%gap(c)

@@ -6,6 +6,9 @@
 !> solves, that is motion and no error. What moves then against the bodies may be error as before: the spread, and the way of
 !> boundaries against the centre of mass.
 !>
+!> Bodies that move while most of the others rest hide neither their motion nor that of boundaries: where bodies with half of the mass
+!> of all that are awake are slow, and move by less than the errors of solves in the mean, the step counts as one of rest for them.
+!>
 !> The spread is that of a uniform velocity gradient, A = sum m (v - v_c) (x - x_c)^T/(M R), with the centre of mass c, the mass M
 !> and the radius of gyration R of the grains. Its norm is at most the root mean square of v - v_c. Along periodic axes grains have
 !> no place; there the cell may creep, at the velocity gradient times its edges.
@@ -30,6 +33,8 @@ module gravier_drift
   real(dp), parameter :: most_drift = 0.01_dp, free_part = 0.4_dp, halving_part = 0.04_dp, least_share = 1.0e-3_dp
   !> times the errors of solves above which a grain is in the air, and a boundary moves freely
   real(dp), parameter :: in_air = 10.0_dp
+  !> part of the mass of the bodies that are awake which has to rest where others move
+  real(dp), parameter :: most_of_all = 0.5_dp
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
   integer, parameter :: of_centre = 1, of_spread = 2, of_cell = 3
@@ -37,11 +42,13 @@ module gravier_drift
   integer, parameter :: in_mass = 1, in_place = 1, in_momentum = 4, in_square = 7, in_product = 10, n_sums = 19
 
   !> its state, in words: the version of checkpoints, which changes with it
-  character(len=*), parameter :: drift_record = "steps way"
+  character(len=*), parameter :: drift_record = "steps slow way"
 
   type :: drift_t
     !> steps whose motion is not told from errors, since the first step
     integer(i8) :: steps = 0
+    !> root mean square velocity of the slow bodies in the last such step, where others moved; negative where none did [m/s]
+    real(dp), private :: slow = -1.0_dp
     !> ways in these steps; vectors have three components, gradients nine by columns (9, ways) [m]
     real(dp), allocatable, private :: way(:, :)
   contains
@@ -57,11 +64,11 @@ contains
   !> Words of the state of a drift.
   pure integer function drift_words(n_boundaries)
     integer, intent(in) :: n_boundaries
-    drift_words = 1 + 9*(of_cell + n_boundaries)
+    drift_words = 2 + 9*(of_cell + n_boundaries)
   end function drift_words
 
-  !> Add the ways of a step that has ended, if its solve has converged and the motion of its bodies against each other is not told
-  !> from the error of the solve. Collective.
+  !> Add the ways of a step that has ended, if its solve has converged and the motion of its bodies against each other, or of most of
+  !> them, is not told from the error of the solve. Collective.
   subroutine drift_note(self, decomposition, physics, impulses, mass, scale, solve)
     class(drift_t), intent(inout) :: self
     !> with the velocities of the end of the step
@@ -78,10 +85,18 @@ contains
     logical :: as_a_whole
     integer :: b
 
+    if (solve%status /= solve_converged) return
     most = unresolved_times*solve%velocity_error
-    if (.not. (scale%apart < most .and. solve%status == solve_converged)) return
+    self%slow = -1.0_dp
+    if (.not. scale%apart < most) then
+      self%slow = slow_motion(decomposition, scale%frame, most)
+      if (.not. (self%slow >= 0.0_dp .and. self%slow < most)) then
+        self%slow = -1.0_dp
+        return
+      end if
+    end if
     self%steps = self%steps + 1
-    as_a_whole = .not. scale%own < most
+    as_a_whole = self%slow < 0.0_dp .and. .not. scale%own < most
     frame(:) = scale%frame
     if (as_a_whole) frame(:) = scale%frame + scale%mean
     if (.not. allocated(self%way)) allocate (self%way(9, of_cell + size(decomposition%boundaries)), source=0.0_dp)
@@ -110,6 +125,36 @@ contains
       call add_way(velocity, physics%h, most, self%way(:, of_cell + b))
     end do
   end subroutine drift_note
+
+  !> Root mean square velocity of the free bodies that are slow, beside that of an observer, where they are most of those that are
+  !> awake; else -1 [m/s]. Collective.
+  real(dp) function slow_motion(decomposition, frame, most) result(motion)
+    type(decomposition_t), intent(in) :: decomposition
+    !> velocity of the observer, and what errors may be [m/s]
+    real(dp), intent(in) :: frame(3), most
+    !> mass of the bodies that are awake, of the slow ones among them, and twice the energy of these
+    real(dp) :: parts(3, size(decomposition%owned)), sums(3), square
+    integer :: s, r, k
+
+    parts(:, :) = 0.0_dp
+    do s = 1, size(parts, 2)
+      associate (bodies => decomposition%owned(s))
+        do r = 1, bodies%awake%n
+          do k = bodies%awake%first(r), bodies%awake%last(r)
+            if (bodies%glued(k) > 0) cycle
+            square = sum((bodies%velocity(1:bodies%nd, k) - frame(1:bodies%nd))**2)
+            parts(1, s) = parts(1, s) + bodies%mass(k)
+            if (square > (in_air*most)**2) cycle
+            parts(2, s) = parts(2, s) + bodies%mass(k)
+            parts(3, s) = parts(3, s) + bodies%mass(k)*square
+          end do
+        end do
+      end associate
+    end do
+    call decomposition%comm%sum_parts(parts, sums)
+    motion = -1.0_dp
+    if (sums(1) > 0.0_dp .and. sums(2) >= most_of_all*sums(1)) motion = sqrt(sums(3)/sums(2))
+  end function slow_motion
 
   !> Add the way of a step at a velocity, of which no more counts than the errors may be.
   pure subroutine add_way(velocity, h, most, way)
@@ -229,13 +274,15 @@ contains
     class(drift_t), intent(in) :: self
     !> of the step
     type(velocity_scale_t), intent(in) :: scale
-    real(dp) :: halvings
+    real(dp) :: halvings, apart
 
     share = 1.0_dp
     if (self%steps == 0 .or. .not. (scale%diameter > 0.0_dp .and. scale%value > 0.0_dp)) return
     halvings = (self%length()/(most_drift*scale%diameter) - free_part)/halving_part
     if (.not. halvings > 0.0_dp) return
-    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), scale%share*scale%apart/scale%value))
+    apart = scale%apart
+    if (self%slow >= 0.0_dp) apart = min(apart, self%slow)
+    share = min(1.0_dp, max(least_share, 2.0_dp**(-min(halvings, 64.0_dp)), scale%share*apart/scale%value))
   end function drift_goal_share
 
   pure subroutine drift_get_state(self, words)
@@ -246,10 +293,11 @@ contains
 
     words(:) = 0
     words(1) = self%steps
+    words(2) = transfer(self%slow, 0_i8)
     if (.not. allocated(self%way)) return
     do w = 1, size(self%way, 2)
       do d = 1, 9
-        words(1 + 9*(w - 1) + d) = transfer(self%way(d, w), 0_i8)
+        words(2 + 9*(w - 1) + d) = transfer(self%way(d, w), 0_i8)
       end do
     end do
   end subroutine drift_get_state
@@ -261,12 +309,13 @@ contains
     integer :: d, w
 
     self%steps = words(1)
+    self%slow = transfer(words(2), 0.0_dp)
     if (allocated(self%way)) deallocate (self%way)
     if (self%steps == 0) return
-    allocate (self%way(9, (size(words) - 1)/9))
+    allocate (self%way(9, (size(words) - 2)/9))
     do w = 1, size(self%way, 2)
       do d = 1, 9
-        self%way(d, w) = transfer(words(1 + 9*(w - 1) + d), 0.0_dp)
+        self%way(d, w) = transfer(words(2 + 9*(w - 1) + d), 0.0_dp)
       end do
     end do
   end subroutine drift_set_state
