@@ -10,8 +10,8 @@ from gravier_runs import SOURCE
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 import curve_pictures  # noqa: E402
+import gravier  # noqa: E402
 import gravier_plot  # noqa: E402
-from picture_style import PictureError  # noqa: E402
 
 
 class Axes(unittest.TestCase):
@@ -109,12 +109,12 @@ class Steps(unittest.TestCase):
         run = SimpleNamespace(path="results.h5", steps=[0, 50, 100, 150, 200], find_step=lambda step: 200 if step is None else step)
         for text, steps in (("all", [50, 100, 150, 200]), ("150,50", [50, 150]), ("100:", [100, 150, 200]), ("60:150", [100, 150]), (":100", [50, 100]),
                             (":", [50, 100, 150, 200]), ("50,140:160", [50, 150]), ("100:150,150:", [100, 150, 200])):
-            self.assertEqual(curve_pictures.steps_of_profile(run, gravier_plot.steps_of(text)), steps, text)
-        self.assertEqual(curve_pictures.steps_of_profile(run, [None]), [200])
-        with self.assertRaisesRegex(PictureError, "results.h5: no written step from 110 to 140; expected some of 50 to 200"):
-            curve_pictures.steps_of_profile(run, [(110, 140)])
-        with self.assertRaisesRegex(PictureError, "no step with means over regions; expected one after the start"):
-            curve_pictures.steps_of_profile(SimpleNamespace(path="results.h5", steps=[0]), "all")
+            self.assertEqual(gravier.Run.steps_in(run, gravier_plot.steps_of(text)), steps, text)
+        self.assertEqual(gravier.Run.steps_in(run, [None]), [200])
+        with self.assertRaisesRegex(gravier.ResultsError, "results.h5: no written step from 110 to 140; expected some of 50 to 200"):
+            gravier.Run.steps_in(run, [(110, 140)])
+        with self.assertRaisesRegex(gravier.ResultsError, "no step after the start; expected one at least"):
+            gravier.Run.steps_in(SimpleNamespace(path="results.h5", steps=[0]), "all")
         for text in ("", "a", "1:2:3", "-5", "1,,2", "1.5"):
             with self.assertRaisesRegex(gravier_plot.argparse.ArgumentTypeError, "expected all, or steps and ranges of them such as 100,5000:8000"):
                 gravier_plot.steps_of(text)
