@@ -102,6 +102,21 @@ class Axes(unittest.TestCase):
         plt.close(figure)
 
 
+class Labels(unittest.TestCase):
+
+    def test_long(self):
+        """Labels are no longer than their panels: long ones have several lines, and short ones one."""
+        names = ["kinetic energy", "force y: the floor of the hopper / force x: the floor of the hopper", "a/b", "a long name that goes on and on for ever / another one of the same kind [N/(m/s)]"]
+        figure = curve_pictures.draw_panels([curve_pictures.Panel(name, [([0.0, 1.0], [0.0, 1.0], None)]) for name in names])
+        figure.canvas.draw()
+        for axes, name in zip(figure.axes, names):
+            label = axes.yaxis.label
+            self.assertEqual(label.get_text().replace("\n", " "), name)
+            self.assertLessEqual(label.get_window_extent().height, axes.get_window_extent().height)
+        self.assertEqual([axes.get_ylabel().count("\n") for axes in figure.axes][::2], [0, 0])
+        plt.close(figure)
+
+
 class Steps(unittest.TestCase):
 
     def test_of_a_profile(self):
