@@ -260,6 +260,17 @@ class Velocities(unittest.TestCase):
         fields = gravier.fields(Grains(at_random(100, [0.3, 0.3]), np.tile([3.0, -2.0], (100, 1))), 0.05, smooth=0.04)
         np.testing.assert_allclose(np.nan_to_num(fields.granular_temperature), 0.0, atol=1e-13)
 
+    def test_shear_within_the_kernel(self):
+        """A shear adds to the temperature along the flow its rate times the width of the kernel, squared, as the documentation has it."""
+        y = (np.arange(6000) + 0.5) / 6000.0
+        run = Grains(np.stack([np.full(6000, 0.5), y], axis=1), np.stack([2.0 * y, 0.0 * y], axis=1))
+        run.body_rows["radius"] = np.full(6000, 1e-4)
+        for cell, smooth, width in ((0.05, 0.0, 0.05**2 / 12.0), (0.02, 0.06, 0.06**2 + 0.02**2 / 6.0), (0.02, 0.02, 0.02**2 + 0.02**2 / 6.0)):
+            fields = gravier.fields(run, cell, axes="y", smooth=smooth)
+            inside = np.abs(fields.y - 0.5) < 0.2
+            # the Gauss curve is cut at three widths
+            np.testing.assert_allclose(fields.temperature[inside, 0], 4.0 * width, rtol=0.04 if smooth else 1e-3)
+
     def test_means_over_states(self):
         """Velocities are weighted by mass, densities by time; the fields of each state by itself have the densities whose mean that is. Fluctuations are those about the mean of all states."""
         one, three = [[0.05, 0.05]], [[0.05, 0.05], [0.02, 0.05], [0.08, 0.05]]

@@ -91,7 +91,8 @@ class Chosen:
             if np.any((run.period > 0.0) & (self.high - self.low > (1.0 + NEARLY) * run.period)):
                 raise ResultsError(f"box {' '.join(f'{side:g}' for side in self.box)}: expected a box of at most a period")
             return
-        ends = [self._ends(step) for step in states]
+        periodic = bool(np.all(run.period > 0.0))
+        ends = [(run.origin, run.origin + run.period) if periodic else self._ends(step) for step in states]
         self.low, self.high = np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
         for axis in range(d):
             if run.period[axis] > 0.0:
@@ -125,7 +126,7 @@ class Chosen:
         width = np.array([self.smooth / length * n if axis in self.axes else 0.0 for axis, n, length in zip("xyz", count, np.linalg.norm(edges, axis=1))])
         pad = [reach_of(w) for w in width]
         if np.prod(count + 2 * np.where(wraps, 0, pad), dtype=float) > MOST_CELLS:
-            raise ResultsError(f"cell {self.cell:g}: {' x '.join(map(str, count))} cells{' and those for the kernel' if self.smooth else ''}; expected {MOST_CELLS} at most")
+            raise ResultsError(f"cell {self.cell:g}: {' x '.join(map(str, count))} cells{' and those for the kernel' if self.smooth else ''}; expected {MOST_CELLS} at most, by larger cells, fewer axes or a box")
         repeat = np.where(wraps | (run.period <= 0.0), 0.0, run.period / lengths * count)
         return Grid(count, wraps, corner, edges, (self.box is None, pad, repeat)), Kernel(width)
 
