@@ -136,7 +136,8 @@ class Grids(unittest.TestCase):
         self.assertAlmostEqual(way**2 @ smooth, 9.0, delta=0.3)
         np.testing.assert_allclose(smooth[20:25] / smooth[20], np.exp(-way[20:25]**2 / 18.0), rtol=0.01)
         # the cell at 20 is so many cells above those below it
-        np.testing.assert_allclose(Kernel([3.0]).smooth(grid, one, 0)[0], -way * smooth, atol=1e-14)
+        np.testing.assert_allclose(Kernel([3.0]).smooth(grid, one, [0])[0], -way * smooth, atol=1e-14)
+        np.testing.assert_allclose(Kernel([3.0]).smooth(grid, one, [0, 0])[0], way**2 * smooth, atol=1e-13)
         wrapped = Grid([5], [True], [0.0], [[5.0]], (True, 0, np.zeros(1)))
         np.testing.assert_allclose(Kernel([4.0]).smooth(wrapped, np.ones((1, 5))), 1.0, rtol=1e-14)
 
@@ -261,15 +262,25 @@ class Velocities(unittest.TestCase):
         np.testing.assert_allclose(np.nan_to_num(fields.granular_temperature), 0.0, atol=1e-13)
 
     def test_shear_within_the_kernel(self):
-        """A shear adds to the temperature along the flow its rate times the width of the kernel, squared, as the documentation has it."""
+        """A shear within the kernel adds nothing to the temperature, and to the kinetic stress its rate times the width of the kernel, squared, as the documentation has it."""
         y = (np.arange(6000) + 0.5) / 6000.0
-        run = Grains(np.stack([np.full(6000, 0.5), y], axis=1), np.stack([2.0 * y, 0.0 * y], axis=1))
+        run = Grains(np.stack([np.full(6000, 0.5), y], axis=1), np.stack([2.0 * y, 0.0 * y], axis=1), contacts=([(2, 1)], np.array([[1.0, 0.0]]), np.zeros((1, 2))))
         run.body_rows["radius"] = np.full(6000, 1e-4)
         for cell, smooth, width in ((0.05, 0.0, 0.05**2 / 12.0), (0.02, 0.06, 0.06**2 + 0.02**2 / 6.0), (0.02, 0.02, 0.02**2 + 0.02**2 / 6.0)):
             fields = gravier.fields(run, cell, axes="y", smooth=smooth)
             inside = np.abs(fields.y - 0.5) < 0.2
+            np.testing.assert_allclose(fields.temperature[inside], 0.0, atol=1e-13)
             # the Gauss curve is cut at three widths
-            np.testing.assert_allclose(fields.temperature[inside, 0], 4.0 * width, rtol=0.04 if smooth else 1e-3)
+            np.testing.assert_allclose(fields.kinetic_stress[inside, 0, 0] / fields.density[inside], 4.0 * width, rtol=0.04 if smooth else 1e-3)
+        # a linear field has no temperature anywhere, and fluctuations of one kind have theirs beside any linear field
+        position, still = at_random(2000, [0.3, 0.3]), np.where(np.arange(2000) % 2 == 0, 1.0, -1.0)[:, None] * [3.0, 0.0]
+        gradient = np.array([[1.0, 30.0], [-20.0, 5.0]])
+        for smooth in (0.0, 0.02):
+            rows = [gravier.fields(Grains(position, velocity), 0.05, smooth=smooth) for velocity in (position @ gradient.T, still, still + position @ gradient.T)]
+            known = rows[0].grains > 30.0
+            np.testing.assert_allclose(rows[0].temperature[known], 0.0, atol=1e-9)
+            np.testing.assert_allclose(rows[1].temperature[known], rows[2].temperature[known], atol=1e-9)
+            self.assertAlmostEqual(rows[1].temperature[known, 0].mean(), 9.0, delta=0.6)
 
     def test_means_over_states(self):
         """Velocities are weighted by mass, densities by time; the fields of each state by itself have the densities whose mean that is. Fluctuations are those about the mean of all states."""

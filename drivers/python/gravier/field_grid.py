@@ -141,12 +141,12 @@ class Kernel:
             sides = np.array([0.5 * math.erf((k - 0.5) / (w * math.sqrt(2.0))) for k in range(-reach, reach + 2)]) if reach else np.array([0.0, 1.0])
             self.weights.append(np.diff(sides) / (sides[-1] - sides[0]))
 
-    def smooth(self, grid, values, moment_of=None):
-        """Values (k, cells) smoothed; with `moment_of` an axis these times the way along this axis from the cell that they come to, in cells."""
+    def smooth(self, grid, values, moments=()):
+        """Values (k, cells) smoothed; with `moments` these times the way along each of these axes from the cell that they come to, in cells."""
         box = values.reshape(len(values), *grid.shape)
         for axis, weights in enumerate(self.weights):
             reach = len(weights) // 2
-            factors = weights * np.arange(-reach, reach + 1) if axis == moment_of else weights
+            factors = weights * np.arange(-reach, reach + 1.0)**list(moments).count(axis)
             found = np.zeros_like(box)
             for way, factor in zip(range(-reach, reach + 1), factors):
                 if factor != 0.0:

@@ -7,7 +7,8 @@ from .results import along, tangents
 from .tables import ResultsError
 
 #: names of the sums of a state without contacts, with the number of their rows by the dimension
-ROWS = {"grains": lambda d: 1, "diameters": lambda d: 1, "volume": lambda d: 1, "mass": lambda d: 1, "momentum": lambda d: d, "squares": lambda d: d * d, "places": lambda d: d}
+ROWS = {"grains": lambda d: 1, "diameters": lambda d: 1, "volume": lambda d: 1, "mass": lambda d: 1, "momentum": lambda d: d, "squares": lambda d: d * d, "places": lambda d: d,
+        "carried": lambda d: d * d, "spread": lambda d: d * d}
 
 
 class Motion:
@@ -27,7 +28,7 @@ class Motion:
 
 def motion_sums(run, bodies, grid, motion):
     """Sums over the cells, by name (rows, cells): of the free bodies whose centres are there grains, diameters [m], volume, mass, momentum, the squares m v v (d d), and places, m times the way from the
-    middle of the cell, in cells; `solid`, the volume of the parts of all bodies that are in a cell. Velocities are those beside the homogeneous motion of a periodic cell."""
+    middle of the cell, in cells, the products carried, m v times this way, and spread, m times its squares (d d); `solid`, the volume of the parts of all bodies that are in a cell. Velocities are those beside the homogeneous motion of a periodic cell."""
     if "mass" not in bodies:
         raise ResultsError(f"{run.path}: no mass of the bodies; expected the results of a run")
     d = run.dimension
@@ -36,8 +37,8 @@ def motion_sums(run, bodies, grid, motion):
     free = bodies.boundary == 0 if "boundary" in bodies else np.ones(len(bodies), dtype=bool)
     mass, velocity, place = bodies.mass[free], bodies.velocity[free] - motion.at(bodies.position[free]), grid.places(bodies.position[free])
     momentum = mass[:, None] * velocity
-    columns = [np.ones(len(mass)), 2.0 * balls[free], volume[free], mass, *momentum.T, *(momentum[:, :, None] * velocity[:, None, :]).reshape(-1, d * d).T,
-               *(mass[:, None] * (place - np.floor(place) - 0.5)).T]
+    way = place - np.floor(place) - 0.5
+    columns = [np.ones(len(mass)), 2.0 * balls[free], volume[free], mass, *momentum.T, *_products(momentum, velocity), *(mass[:, None] * way).T, *_products(momentum, way), *_products(mass[:, None] * way, way)]
     sums = grid.sums(grid.cells(place), np.stack(columns, axis=1))
     found, first = {}, 0
     for name, rows in ROWS.items():
@@ -45,6 +46,11 @@ def motion_sums(run, bodies, grid, motion):
         first += rows(d)
     found["solid"] = grid.volumes_of_balls(bodies.position, balls)[None]
     return found
+
+
+def _products(one, other):
+    """Of the vectors of two arrays (n, d), a row a product (d d, n)."""
+    return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1).T
 
 
 def contact_sums(run, step, bodies, contacts, grid):
@@ -56,7 +62,7 @@ def contact_sums(run, step, bodies, contacts, grid):
     if cell is not None:
         grid = Grid(grid.count, grid.wraps, cell.origin[:, 0], cell.edge, (grid.is_open, grid.pad, grid.repeat))
     line, cells, part = grid.parts_of_lines(grid.places(moved.position[body]), grid.ways(way))
-    products = -(force[:, :, None] * way[:, None, :]).reshape(len(way), -1)
+    products = -_products(force, way).T
     row, other = run._rows(bodies, contacts)
     _, neighbours = ends_of(contacts, row, other, contacts.impulse[:, 0] > 0.0, len(bodies) + 1)
     free = bodies.boundary == 0 if "boundary" in bodies else np.ones(len(bodies), dtype=bool)

@@ -177,10 +177,15 @@ class Chosen:
 
 
 def _smoothed(total, grid, kernel):
-    """Mean sums per volume, smoothed; `places` are the ways from the middle of the cell to which they come."""
+    """Mean sums per volume, smoothed; the ways in `places`, `carried` and `spread` are those from the middle of the cell to which they come."""
     means = {name: kernel.smooth(grid, values) for name, values in total.items()}
-    for axis in range(len(grid.count)):
-        means["places"][axis] += kernel.smooth(grid, total["mass"], axis)[0]
+    d = len(grid.count)
+    carried, spread = (means[name].reshape(d, d, -1) for name in ("carried", "spread"))
+    for a in range(d):
+        carried[:, a] += kernel.smooth(grid, total["momentum"], [a])
+        for b in range(d):
+            spread[a, b] += kernel.smooth(grid, total["places"][[a]], [b])[0] + kernel.smooth(grid, total["places"][[b]], [a])[0] + kernel.smooth(grid, total["mass"], [a, b])[0]
+        means["places"][a] += kernel.smooth(grid, total["mass"], [a])[0]
     return means
 
 
@@ -192,16 +197,26 @@ def _figures(means, grid, shape, homogeneous):
         def over(values, by):
             return np.where(filled, values / np.where(filled, by, 1.0), np.nan)
 
-        velocity = over(means["momentum"], density).T
-        spread = over(means["squares"], density).T.reshape(-1, d, d) - velocity[:, :, None] * velocity[:, None, :]
-        squares = np.maximum(np.einsum("caa->ca", spread), 0.0)
-        gradient = _gradient(velocity, over(means["places"], density).T, np.where(filled, density, 0.0), (grid, shape)) + homogeneous
+        def products(name):
+            return over(means[name], density).T.reshape(-1, d, d)
+
+        velocity, places = over(means["momentum"], density).T, over(means["places"], density).T
+        squares = products("squares") - velocity[:, :, None] * velocity[:, None, :]
+        slopes = _slopes(velocity, places, np.where(filled, density, 0.0), (grid, shape))
+        # the variance of what velocities are beside the linear field; where that is not known, beside their mean
+        linear = np.nan_to_num(slopes)
+        turned = linear @ (products("carried") - velocity[:, :, None] * places[:, None, :]).transpose(0, 2, 1)
+        spread = products("spread") - places[:, :, None] * places[:, None, :]
+        squares_beside = squares - turned - turned.transpose(0, 2, 1) + linear @ spread @ linear.transpose(0, 2, 1)
+        temperature = np.maximum(np.einsum("caa->ca", squares_beside), 0.0)
+        # in cells: a place along x is so many cells further along each axis
+        gradient = slopes @ (grid.inverse * grid.count).T + homogeneous
         rates = 0.5 * (gradient + gradient.transpose(0, 2, 1))
-        found = {"grains": means["number"][0], "solid_fraction": means["solid"][0], "density": density, "velocity": velocity, "temperature": squares,
-                 "granular_temperature": squares.mean(axis=1), "gradient": gradient, "shear_rate": 2.0 * _size(_deviator(rates))}
+        found = {"grains": means["number"][0], "solid_fraction": means["solid"][0], "density": density, "velocity": velocity, "temperature": temperature,
+                 "granular_temperature": temperature.mean(axis=1), "gradient": gradient, "shear_rate": 2.0 * _size(_deviator(rates))}
         if "stress" not in means:
             return found
-        kinetic = np.where(filled[:, None, None], density[:, None, None] * spread, 0.0)
+        kinetic = np.where(filled[:, None, None], density[:, None, None] * squares, 0.0)
         contact = means["stress"].T.reshape(-1, d, d)
         stress = contact + kinetic
         pressure = np.trace(stress, axis1=1, axis2=2) / d
@@ -224,9 +239,9 @@ def _size(tensors):
     return np.sqrt(0.5 * np.einsum("cab,cab->c", tensors, tensors))
 
 
-def _gradient(velocity, places, weight, grid_and_shape):
-    """Gradients of the velocity (cells, d, d): those of the linear field of least squares through the cell and those around it, each with its mean velocity at its centre of mass and weighted by its
-    mass, so that a linear field is found to rounding. 0 along axes with one cell; NaN where neighbours do not tell it."""
+def _slopes(velocity, places, weight, grid_and_shape):
+    """Gradients of the velocity (cells, d, d), by cells along each axis of the grid: those of the linear field of least squares through the cell and those around it, each with its mean velocity at its centre of
+    mass and weighted by its mass, so that a linear field is found to rounding. 0 along axes with one cell; NaN where neighbours do not tell it."""
     grid, shape = grid_and_shape
     d = len(shape)
     axes = [axis for axis in range(d) if shape[axis] > 1]
@@ -248,9 +263,6 @@ def _gradient(velocity, places, weight, grid_and_shape):
     scale = np.trace(normal, axis1=1, axis2=2)
     told = (weight > 0.0) & (scale > 0.0)
     told[told] = np.linalg.eigvalsh(normal[told] / scale[told, None, None])[:, 0] > OPEN
-    slopes = np.full((len(velocity), len(axes), d), np.nan)
-    slopes[told] = np.linalg.solve(normal[told], right[told])
-    # in cells: a place along x is so many cells further along each axis
-    further = (grid.inverse * grid.count)[:, axes]
-    return np.einsum("xk,ckv->cvx", further, slopes)
-
+    found[~told] = np.nan
+    found[np.ix_(told, range(d), axes)] = np.linalg.solve(normal[told], right[told]).transpose(0, 2, 1)
+    return found
