@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 
 from forked_scripts import script
-from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case
+from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 from test_force_measures import STEP, Made, R, plane
 import gravier
 from gravier.field_grid import Grid, Kernel, reach_of
@@ -422,6 +422,35 @@ class Runs(RunTestCase):
         whole = gravier.fields(run, 0.03, smooth=0.01)
         self.assertEqual(len(whole.shape), 3)
         np.testing.assert_allclose(whole.contact_stress.sum(axis=0) * cell_volume(whole), (bed.stress * bed.volume[:, None, None]).sum(axis=0), atol=1e-9 * np.abs(bed.stress).max())
+
+    def test_bodies_with_shapes(self):
+        """A brick, a cluster of two and a capsule: the solid fractions of layers are those of a region, which cuts them, to a few thousandths; the integral of the stress is that of history.csv, and the volume all of it."""
+        write(self.here("three.shapes"), "shape brick\npolygon -0.1 -0.04  0.1 -0.04  0.1 0.04  -0.1 0.04\nshape ell\npolygon 0 0  0.1 0  0.1 0.04  0 0.04\npolygon 0 0.04  0.04 0.04  0.04 0.1  0 0.1\n"
+                                         "shape pill\ncapsule -0.05 0  0.05 0  0.03\n")
+        write(self.here("three.csv"), "id,x,y,shape,angle,radius,nx,ny\n1,0.1,0.041,brick,,,,\n2,0.13,0.13,ell,0.3,,,\n3,0.2,0.3,pill,0.2,,,\n4,0.3,0.04,,,0.03,,\n5,0,0,plane,,,0,1\n")
+        run = run_case({"scene": {"bodies": "file", "bodies_file": "three.csv", "shapes": "three.shapes", "friction": 0.5}, "time": {"step": 1e-3, "steps": 120},
+                        "region": {"name": "bed", "lower": [-0.5, 0.0], "upper": [0.8, 0.6], "axis": "y", "bins": 12}, "output": {"directory": "three", "every": 0, "stress": True}}, 1, self.scratch)
+        self.assert_status(run, 0)
+        run = self.open("three")
+        fields, bed = gravier.fields(run, 0.05, axes="y", box=[-0.5, 0.8, 0.0, 0.6]), run.region("bed")
+        np.testing.assert_allclose(fields.solid_fraction, bed.solid_fraction, atol=4e-3 * bed.solid_fraction.max())
+        fields, history = gravier.fields(run, 0.05, smooth=0.04), run.history()
+        self.assertAlmostEqual(fields.solid_fraction.sum() * cell_volume(fields) / run.volumes(run.bodies()).sum(), 1.0, delta=EPS)
+        stress = np.array([[history[f"stress_{a}{b}"][-1] for b in "xy"] for a in "xy"]) * history.volume[-1]
+        self.assertGreater(stress[1, 1], 0.0)
+        np.testing.assert_allclose(fields.contact_stress.sum(axis=0) * cell_volume(fields), stress, atol=1e-7 * np.abs(stress).max())
+
+    def test_points_of_shapes(self):
+        """Points fill polyhedra, capsules and balls evenly: halves hold halves of them, and all are inside."""
+        corner = np.array([[x, y, z] for z in (-0.2, 0.2) for y in (-0.3, 0.3) for x in (-0.9, 0.9)])
+        faces = [np.array(face) for face in ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))]
+        for pieces, half in (([gravier.Piece(0.0, corner, corner, faces)], [0.9, 0.3, 0.2]), ([gravier.Piece(0.3, corner[:1] * 0.0, corner[:1] * 0.0, [])], [0.3] * 3),
+                             ([gravier.Piece(0.2, corner[:2] + [0.0, 0.3, 0.2], corner[:2] + [0.0, 0.3, 0.2], [])], [1.1, 0.2, 0.2])):
+            points = gravier.Shape("a", 1.0, 1.0, np.ones(3), pieces).points(2000)
+            self.assertEqual(len(points), 2000)
+            self.assertTrue(np.all(np.abs(points) <= half))
+            np.testing.assert_allclose(np.mean(points > 0.0, axis=0), 0.5, atol=0.01)
+            self.assertTrue(np.all(np.abs(points).max(axis=0) > 0.95 * np.array(half)))
 
     def test_history(self):
         """Mean stress and coordination over all cells are those of history.csv."""

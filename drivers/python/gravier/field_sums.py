@@ -1,11 +1,14 @@
 """Sums over the cells of a grid in one state of a run: masses, momenta and their squares, volumes, contacts and the forces along their branches."""
 import numpy as np
 
-from .field_grid import Grid
+from .field_grid import MOST_PARTS, Grid
 from .force_networks import ends_of
 from .results import along, tangents
+from .shapes import axes_of
 from .tables import ResultsError
 
+#: that fill a body with a shape
+POINTS = 512
 #: names of the sums of a state without contacts, with the number of their rows by the dimension
 ROWS = {"grains": lambda d: 1, "diameters": lambda d: 1, "volume": lambda d: 1, "mass": lambda d: 1, "momentum": lambda d: d, "squares": lambda d: d * d, "places": lambda d: d,
         "carried": lambda d: d * d, "spread": lambda d: d * d}
@@ -44,8 +47,22 @@ def motion_sums(run, bodies, grid, motion):
     for name, rows in ROWS.items():
         found[name] = sums[first:first + rows(d)]
         first += rows(d)
-    found["solid"] = grid.volumes_of_balls(bodies.position, balls)[None]
+    found["solid"] = solid_volumes(run, bodies, grid, balls)[None]
     return found
+
+
+def solid_volumes(run, bodies, grid, balls):
+    """The volume of the parts of bodies in each cell (cells), of disks and spheres with the radii `balls`; of a body with a shape that of POINTS points that fill it, which stand for equal parts of it."""
+    shape = bodies.get("shape", np.zeros(len(bodies), dtype=int))
+    total = grid.volumes_of_balls(bodies.position[shape == 0], balls[shape == 0])
+    shapes, volumes = run.shapes() if np.any(shape > 0) else [], run.volumes(bodies)
+    for number in np.unique(shape[shape > 0]):
+        points, rows = shapes[number - 1].points(POINTS), np.flatnonzero(shape == number)
+        for some in np.array_split(rows, -(-len(rows) * POINTS // MOST_PARTS)):
+            places = bodies.position[some][:, None] + bodies.radius[some][:, None, None] * (points @ axes_of(bodies.orientation[some]).transpose(0, 2, 1))
+            cells = grid.cells(grid.places(places.reshape(-1, run.dimension)))
+            total += grid.sums(cells, np.repeat(volumes[some] / POINTS, POINTS)[:, None])[0]
+    return total
 
 
 def _products(one, other):
