@@ -13,6 +13,7 @@ from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 from test_force_measures import STEP, Made, R, plane
 import gravier
+from gravier.fields import Chosen
 from gravier.field_grid import Grid, Kernel, reach_of
 from gravier.field_sums import half_branches
 
@@ -119,6 +120,12 @@ class Grids(unittest.TestCase):
             np.testing.assert_allclose(box[(slice(1, 3),) * d], ball / 2**d, rtol=1e-14)
             point = np.array([[4.5] + [5.0] * (d - 1)])
             self.assertAlmostEqual(grid.volumes_of_balls(point, np.array([1.0])).reshape(grid.shape)[1].sum() / ball, segment, delta=1e-14)
+            # along the normal of a side that leans the ball ends a radius from its centre
+            edges = 8.0 * np.eye(d)
+            edges[1, 0] = 6.0
+            grid = Grid([8] + [1] * (d - 1), [True] * d, np.zeros(d), edges, (True, 0, np.zeros(d)))
+            point = np.array([[4.0 * edges[0] + 4.0 * edges[1]]]).reshape(1, d) / 8.0 + 0.5 * np.eye(d)[:1] * np.hypot(1.0, 0.75)
+            self.assertAlmostEqual(grid.volumes_of_balls(point, np.array([1.0]))[:4].sum() / ball, segment, delta=1e-13)
             for edges in (8.0 * np.eye(d), 8.0 * np.eye(d) + 3.0 * np.eye(d, k=-1)):
                 grid = Grid([7] * d, [True] * d, np.zeros(d), edges, (True, 0, np.zeros(d)))
                 radii = 0.2 + np.random.default_rng(2).random(50)
@@ -297,6 +304,14 @@ class Velocities(unittest.TestCase):
         # the grid is that of all states
         self.assertEqual(len({state.shape for state in gravier.fields_of_states(run, 0.01)}), 1)
         self.assertNotIn("pressure", fields)
+        # stresses and coordination are means over the states that have contacts
+        position, period, contacts = triangular(4)
+        run = Grains(position, contacts=contacts, period=period)
+        alone = gravier.fields(run, 1.0)
+        run.steps, run.times, held = np.array([1, 2]), np.array([STEP, 2.0 * STEP]), run.contacts
+        run.contacts = lambda step=None: held() if step == 1 else None
+        both = gravier.fields(run, 1.0)
+        np.testing.assert_allclose([both.pressure, both.coordination, both.states], [alone.pressure, alone.coordination, [2]], rtol=EPS)
 
 
 class Cells(unittest.TestCase):
@@ -326,6 +341,34 @@ class Cells(unittest.TestCase):
                 np.testing.assert_allclose(fields.granular_temperature, 0.0, atol=1e-12)
                 np.testing.assert_allclose([fields.density.sum() * cell_volume(fields), fields.solid_fraction.sum() * cell_volume(fields)], [64.0, 64.0 * np.pi * R**2], rtol=EPS)
                 np.testing.assert_allclose(fields.contact_stress.sum(axis=0) * cell_volume(fields), 5.0 * 2.0 * R * 96.0 * np.eye(2), atol=1e-11)
+
+    def test_middle_of_the_step(self):
+        """Contacts are those of the middle of the step, when grains and the cell were half of a step behind: the ways of both grains meet there, with points of contact and without. A kernel is as wide along an edge that
+        leans as along the others."""
+        run, edge = self.sheared(40.0, 0.25)
+        moved, cell = run.in_the_middle(1)
+        np.testing.assert_allclose(cell.edge[1], edge[1] - [0.5 * STEP * 40.0 * edge[1, 1], 0.0], rtol=EPS)
+        bodies, contacts = run.bodies(), run.contacts()
+        row, other = run._rows(bodies, contacts)
+        apart = (moved.position[other] - moved.position[row]) @ np.linalg.inv(cell.edge)
+        apart = (apart - np.round(apart)) @ cell.edge
+        contacts["normal"], contacts["gap"] = -apart / np.linalg.norm(apart, axis=1)[:, None], np.linalg.norm(apart, axis=1) - 2.0 * R
+        for points in (False, True):
+            if points:
+                contacts["point"] = moved.position[row] + 0.5 * apart
+            body, contact, way, _ = half_branches(run, (1, cell.edge[::-1]), moved, contacts)
+            np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.5 * np.linalg.norm(apart, axis=1)[contact], rtol=1e-12)
+            ends = (moved.position[body] + way) @ np.linalg.inv(cell.edge)
+            ways = ends[:len(row)] - ends[len(row):]
+            np.testing.assert_allclose(ways, np.round(ways), atol=1e-9)
+            fields = gravier.fields(run, 0.03)
+            expected = np.einsum("ca,cb->ab", 5.0 * contacts.normal, -apart)
+            np.testing.assert_allclose(fields.contact_stress.sum(axis=0) * cell_volume(fields), expected, rtol=1e-12, atol=1e-12)
+        chosen = Chosen(run, 0.02, "xy", 0.02, None)
+        chosen.frame([1])
+        grid, kernel = chosen.grid_of(run.cell())
+        for weights, count, along in zip(kernel.weights, grid.count, np.linalg.norm(edge, axis=1)):
+            self.assertEqual(len(weights) // 2, reach_of(0.02 * count / along))
 
     def test_inertial_number(self):
         """Shear rate times diameter times the root of the density of the grains over the pressure; the shear stress over the pressure of a known stress."""
@@ -513,6 +556,7 @@ class Runs(RunTestCase):
         extent, origin, spacing = (np.array(re.search(rf'{name}="([^"]*)"', text)[1].split(), dtype=float) for name in ("WholeExtent", "Origin", "Spacing"))
         np.testing.assert_array_equal(extent, [0, fields.shape[0], 0, 0, 0, fields.shape[1]])
         np.testing.assert_allclose((origin + 0.5 * spacing)[[0, 2]], [fields.x[0], fields.z[0]], rtol=1e-12)
+        self.assertAlmostEqual(origin[1], fields.corner[1] + 0.5 * fields.edges[1, 1], delta=1e-12)
         leaning, edge = Cells.sheared(1.0, 0.25)
         fields = gravier.fields(leaning, 0.03)
         with self.assertRaisesRegex(gravier.ResultsError, "expected a name that ends in .vts"):
