@@ -100,11 +100,12 @@ def measure_forces(run, options):
 
 def measure_fields(run, options):
     """The fields of the chosen states, a list: of all together, or of each."""
+    if options.plot and len(options.axes or "xyz"[:run.dimension]) == 3:
+        raise gravier.ResultsError(f"--plot {options.plot}: a grid of three axes; expected two axes or one for a picture, such as --axes xz")
     asked = (run, options.cell, options.axes, options.states, options.smooth, options.box, options.since)
     found = gravier.fields_of_states(*asked) if options.each else [gravier.fields(*asked)]
-    for path in [options.vtk] if options.vtk else []:
-        if path.suffix != ending_of(found[0]):
-            raise gravier.ResultsError(f"--vtk {path}: expected a name that ends in {ending_of(found[0])}")
+    if options.vtk and options.vtk.suffix != ending_of(found[0]):
+        raise gravier.ResultsError(f"--vtk {options.vtk}: expected a name that ends in {ending_of(found[0])}")
     return found
 
 
@@ -158,7 +159,7 @@ def said_of_fields(fields):
     """The grid, and the largest values of the last fields."""
     last, size = fields[-1], " x ".join(f"{edge:.4g}" for edge in fields[-1].size)
     states = f"mean of {last.states[0]} states, the last one" if last.states[0] > 1 else "state"
-    largest = [f"{name.replace('_', ' ')} {numpy.nanmax(last[name]):.4g}" for name in ("solid_fraction", "granular_temperature", "pressure") if name in last]
+    largest = [f"{name.replace('_', ' ')} {numpy.max(last[name], initial=0.0, where=numpy.isfinite(last[name])):.4g}" for name in ("solid_fraction", "granular_temperature", "pressure") if name in last]
     return [f"{' x '.join(map(str, last.shape))} cells of {size} m along {', '.join(last.axes)}; {states} of step {last.step[0]}; grains {last.grains.sum():.6g}, largest {', '.join(largest)}"]
 
 

@@ -36,7 +36,7 @@ def draw_fields(fields, asked=None, walls=None):
     if len(fields.axes) == 1:
         return draw_along(fields, columns)
     if len(fields.axes) == 3:
-        raise PictureError("fields over x, y and z; expected two axes or one for a picture, such as --axes xz")
+        raise PictureError("fields over x, y and z; expected two axes or one for a picture")
     return draw_cells(fields, columns, walls)
 
 

@@ -300,7 +300,7 @@ class Velocities(unittest.TestCase):
         each = gravier.fields_of_states(run, 0.1, box=box)
         np.testing.assert_allclose([state.density[0] for state in each], [100.0, 300.0], rtol=EPS)
         np.testing.assert_allclose([state.velocity[0, 0] for state in each], [4.0, 0.0])
-        self.assertEqual([len(gravier.fields_of_states(run, 0.1, **options)) for options in ({}, {"steps": [2]}, {"since": 1.5 * STEP}, {"steps": [(None, 1)]})], [2, 1, 1, 1])
+        self.assertEqual([len(gravier.fields_of_states(run, 0.1, **options)) for options in ({}, {"steps": 2}, {"since": 1.5 * STEP}, {"steps": [(None, 1)]})], [2, 1, 1, 1])
         # the grid is that of all states
         self.assertEqual(len({state.shape for state in gravier.fields_of_states(run, 0.01)}), 1)
         self.assertNotIn("pressure", fields)
@@ -395,6 +395,15 @@ class Refusals(unittest.TestCase):
                                        ("no written state from 5 s on", run, {"since": 5.0}), ("no step 7", run, {"steps": [7]})):
             with self.subTest(words), self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.fields(chosen, **{"cell": 0.1, **options})
+        # glued grains alone have a volume and nothing else
+        run.body_rows["boundary"] = np.ones(20, dtype=int)
+        fields = gravier.fields(run, 0.1, smooth=0.05)
+        self.assertAlmostEqual(fields.solid_fraction.sum() * cell_volume(fields), 20.0 * np.pi * R**2, delta=EPS)
+        self.assertFalse(fields.density.any() or np.isfinite(fields.velocity).any() or np.isfinite(fields.temperature).any())
+        # grains without a contact have no stress of contacts
+        run = Grains(at_random(20, [0.3, 0.3]), contacts=(np.zeros((0, 2), dtype=int), np.zeros((0, 2)), np.zeros((0, 2))))
+        fields = gravier.fields(run, 0.1)
+        self.assertFalse(fields.contact_stress.any() or np.isfinite(fields.shear_ratio).any() or np.nan_to_num(fields.coordination).any())
         del run.body_rows["mass"]
         with self.assertRaisesRegex(gravier.ResultsError, "no mass of the bodies"):
             gravier.fields(run, 0.1)

@@ -67,7 +67,7 @@ def solid_volumes(run, bodies, grid, balls):
 
 def _products(one, other):
     """Of the vectors of two arrays (n, d), a row a product (d d, n)."""
-    return (one[:, :, None] * other[:, None, :]).reshape(len(one), -1).T
+    return (one[:, :, None] * other[:, None, :]).reshape(len(one), one.shape[1] * other.shape[1]).T
 
 
 def contact_sums(run, step, bodies, contacts, grid):

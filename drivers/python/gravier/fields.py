@@ -39,7 +39,7 @@ def fields(run, cell, axes=None, steps=None, smooth=0.0, box=None, since=0.0):
     of the grid [m], grains, solid_fraction, density, velocity (d), temperature (d), granular_temperature, gradient (d, d), of the velocity along the row by the place along the column, shear_rate, and where the states have contacts contact_stress and kinetic_stress (d, d),
     compression positive, pressure, shear_ratio, coordination and inertial_number. What a cell without grains does not have is NaN.
 
-    `axes` are those of the grid, "xz" for instance, all unless told; fields are means along the others. `steps` are the states, as in `run.steps_in`, all after the start from the time `since` [s] on unless told. `smooth` is the width of
+    `axes` are those of the grid, "xz" for instance, all unless told; fields are means along the others. `steps` are the states, one or as in `run.steps_in`, all after the start from the time `since` [s] on unless told. `smooth` is the width of
     the kernel [m], 0 for means over the cells. `box` x0, x1, y0, y1[, z0, z1] is the box of the grid [m], that of the grains and planes unless told. doc/measures.md has the definitions."""
     return Chosen(run, cell, axes, smooth, box).of(_states(run, steps, since))
 
@@ -52,7 +52,7 @@ def fields_of_states(run, cell, axes=None, steps=None, smooth=0.0, box=None, sin
 
 
 def _states(run, steps, since):
-    chosen = run.steps_in("all" if steps is None else steps)
+    chosen = run.steps_in("all" if steps is None else [steps] if isinstance(steps, (int, np.integer)) else steps)
     found = [step for step, _ in states_since(run, since) if step in chosen]
     if not found:
         raise ResultsError(f"{run.path}: no written state of steps {chosen[0]} to {chosen[-1]} from {since:g} s on; expected one at least")
