@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls,
-discharge through outlets, contact forces and anisotropy."""
+discharge through outlets, contact forces and anisotropy; and fields on a grid: density, velocity, granular temperature, stress."""
 import sys
 from pathlib import Path
 
@@ -12,16 +12,19 @@ try:
     import gravier
 except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
+from gravier.field_files import ending_of  # noqa: E402
 from gravier.force_networks import directions_of, distribution_of, networks, table_of  # noqa: E402
 from gravier.measured import write_measured  # noqa: E402
 from gravier.mixing import split_radius  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
-from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, whole  # noqa: E402
+from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, steps_of, whole  # noqa: E402
 from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
 HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,",
-         "forces": b"step,time,contacts,normal_mean,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
+         "forces": b"step,time,contacts,normal_mean,", "fields": b"step,time,states,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
+#: what a file of fields begins with, by its ending
+IMAGES = {f".{ending}": rb'<\?xml version="1.0"\?>\n<VTKFile type="' + kind for ending, kind in (("vti", b"ImageData"), ("vts", b"StructuredGrid"))}
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
          "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
@@ -30,7 +33,7 @@ UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m",
 
 def parse(arguments):
     parser = OneLineParser(prog="gravier_measure", description=__doc__)
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow | forces", parser_class=OneLineParser)
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow | forces | fields", parser_class=OneLineParser)
     mixing = kinds.add_parser("mixing", help="Lacey's index and segregation of two kinds of grains, in each written state")
     mixing.add_argument("--by", default="size", metavar="WHAT", help="size, material, or x, y, z: where grains were at the start (size)")
     mixing.add_argument("--value", metavar="V", help="the first kind has radii above V [m] (middle of the radii), is of material V (the second), or began above V [m] "
@@ -47,17 +50,26 @@ def parse(arguments):
     outflow = kinds.add_parser("outflow", help="number and mass of the grains that have left through outlets, and their rates")
     forces = kinds.add_parser("forces", help="distribution of contact forces, coordination, anisotropies and the strength that they make, in written states with contacts")
     forces.add_argument("--region", metavar="NAME", help="contacts and grains in this &region of the case (all)")
-    forces.add_argument("--box", type=finite, nargs="+", metavar="X0", help="contacts and grains in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     forces.add_argument("--friction", type=positive, metavar="MU", help="coefficient of friction of all contacts between grains (that of the case)")
     forces.add_argument("--mean", type=whole(1), default=1, metavar="N", help="N states after each other make a row in the place of single ones")
     forces.add_argument("--distribution", type=Path, metavar="FILE", help="a table of the distribution of forces of all states, .csv")
     forces.add_argument("--width", type=positive, default=0.2, metavar="W", help="of its bins, in forces over their mean (0.2)")
     forces.add_argument("--directions", type=Path, metavar="FILE", help="a table of contacts and forces of all states by direction, .csv")
     forces.add_argument("--bins", type=whole(1), metavar="N", help="of directions (18 over half a turn, in space 9 over a quarter)")
-    forces.add_argument("--plot", type=Path, metavar="FILE", help="a picture of both, .png or .svg (needs matplotlib)")
+    fields = kinds.add_parser("fields", help="solid fraction, density, velocity, granular temperature, stress and what follows from them on a grid, means over written states")
+    fields.add_argument("--cell", type=positive, required=True, metavar="L", help="edge of the cells [m]; the nearest one of which a whole number fits into the scene is taken")
+    fields.add_argument("--axes", metavar="AXES", help="of the grid, such as xz or z; fields are means along the others (all)")
+    fields.add_argument("--states", type=steps_of, metavar="N,N:M", help="written steps and ranges of them as 5000:8000 or 5000:, ends included, or all (all after the start)")
+    fields.add_argument("--smooth", type=positive, default=0.0, metavar="W", help="width of the kernel [m] (means over the cells)")
+    fields.add_argument("--each", action="store_true", help="fields of each state by itself in the place of their mean")
+    fields.add_argument("--vtk", type=Path, metavar="FILE", help="a file for ParaView, .vti, or .vts of a periodic cell that leans")
+    fields.add_argument("--columns", metavar="A,B", help="of the picture (solid_fraction,velocity,granular_temperature,pressure,shear_ratio,inertial_number)")
+    for kind in (forces, fields):
+        kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):
         kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
-    for kind in (mixing, heap, walls, outflow, forces):
+    for kind in (mixing, heap, walls, outflow, forces, fields):
+        kind.add_argument("--plot", type=Path, metavar="FILE", help="a picture of what is measured, .png or .svg (needs matplotlib)")
         kind._negative_number_matcher = NEGATIVE
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
         kind.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
@@ -86,8 +98,30 @@ def measure_forces(run, options):
     return tables, table_of(found, len(found))
 
 
-def draw(tables, together, dimension, path):
-    """The picture of the forces; matplotlib and the modules of gravier_plot are loaded only here."""
+def measure_fields(run, options):
+    """The fields of the chosen states, a list: of all together, or of each."""
+    if options.plot and len(options.axes or "xyz"[:run.dimension]) == 3:
+        raise gravier.ResultsError(f"--plot {options.plot}: a grid of three axes; expected two axes or one for a picture, such as --axes xz")
+    asked = (run, options.cell, options.axes, options.states, options.smooth, options.box, options.since)
+    found = gravier.fields_of_states(*asked) if options.each else [gravier.fields(*asked)]
+    if options.vtk and options.vtk.suffix != ending_of(found[0]):
+        raise gravier.ResultsError(f"--vtk {options.vtk}: expected a name that ends in {ending_of(found[0])}")
+    return found
+
+
+def images_of(options, fields):
+    """The files of the fields, by their places: of each state one with its step in its name."""
+    return {options.vtk.with_stem(f"{options.vtk.stem}_{one.step[0]:08d}") if options.each else options.vtk: one for one in fields} if options.vtk else {}
+
+
+def table_of_fields(fields):
+    """The rows of all states one below the other, a column a component."""
+    flat = [one.flat() for one in fields]
+    return gravier.Table({name: numpy.concatenate([columns[name] for columns in flat]) for name in flat[0] if all(name in columns for columns in flat)})
+
+
+def draw(options, run, tables, together):
+    """The picture of what is measured; matplotlib and the modules of gravier_plot are loaded only here."""
     sys.path.insert(0, str(DRIVERS / "plot"))
     try:
         import matplotlib
@@ -95,11 +129,21 @@ def draw(tables, together, dimension, path):
         import matplotlib.pyplot as plt
     except ImportError as missing:
         raise gravier.ResultsError(f"{missing}; expected a python3 with matplotlib (apt install python3-matplotlib), or no --plot") from None
-    from force_pictures import draw_forces
     from picture_style import SETTINGS, PictureError, save_picture
     plt.rcParams.update(SETTINGS)
     try:
-        save_picture(draw_forces(tables["distribution"], tables["directions"], together.beta[0], dimension), path)
+        if options.kind == "forces":
+            from force_pictures import draw_forces
+            figure = draw_forces(tables["distribution"], tables["directions"], together.beta[0], run.dimension)
+        elif options.kind == "fields":
+            from field_pictures import draw_fields
+            from picture_space import Walls
+            walls = Walls(run, int(together[-1].step[0])) if run.dimension == 2 else None
+            figure = draw_fields(together[-1], options.columns.split(",") if options.columns else None, walls)
+        else:
+            from measure_pictures import draw_measured
+            figure = draw_measured(options.kind, tables[options.kind], run.dimension)
+        save_picture(figure, options.plot)
     except PictureError as refused:
         raise gravier.ResultsError(str(refused)) from None
 
@@ -111,8 +155,18 @@ def in_words(row, run):
                      for name, value in row.items() if name != "step" and not name.startswith(("fabric_", "axis_")))
 
 
+def said_of_fields(fields):
+    """The grid, and the largest values of the last fields."""
+    last, size = fields[-1], " x ".join(f"{edge:.4g}" for edge in fields[-1].size)
+    states = f"mean of {last.states[0]} states, the last one" if last.states[0] > 1 else "state"
+    largest = [f"{name.replace('_', ' ')} {numpy.max(last[name], initial=0.0, where=numpy.isfinite(last[name])):.4g}" for name in ("solid_fraction", "granular_temperature", "pressure") if name in last]
+    return [f"{' x '.join(map(str, last.shape))} cells of {size} m along {', '.join(last.axes)}; {states} of step {last.step[0]}; grains {last.grains.sum():.6g}, largest {', '.join(largest)}"]
+
+
 def said(table, run, options, together=None):
     """The last row in words, of a test its strength, and of forces those of all states."""
+    if options.kind == "fields":
+        return said_of_fields(together)
     lines = [f"last row: {in_words({name: values[-1] for name, values in table.items()}, run)}"]
     if options.kind == "mixing" and options.by == "size":
         limit, one_range = split_radius(run, options.value, options.since)
@@ -136,19 +190,23 @@ def main(arguments=None):
     places.update({name: getattr(options, name, None) for name in ("distribution", "directions") if getattr(options, name, None)})
     for name, place in places.items():
         claim(place, {".csv": HEADS[name]})
-    picture = getattr(options, "plot", None)
-    if picture:
-        claim(picture, PICTURES)
-    together = None
+    if options.plot:
+        claim(options.plot, PICTURES)
+    if getattr(options, "vtk", None):
+        claim(options.vtk, IMAGES)
+    together, images = None, {}
     try:
         run = gravier.Run(options.directory)
         if options.kind == "forces":
             tables, together = measure_forces(run, options)
+        elif options.kind == "fields":
+            together = measure_fields(run, options)
+            tables, images = {"fields": table_of_fields(together)}, images_of(options, together)
         else:
             tables = {options.kind: measure(run, options)}
         lines = said(tables[options.kind], run, options, together)
-        if picture:
-            draw(tables, together, run.dimension, picture)
+        if options.plot:
+            draw(options, run, tables, together)
     except gravier.ResultsError as refused:
         print(f"gravier_measure: error: {plain(refused)}", file=sys.stderr)
         return 2
@@ -159,7 +217,10 @@ def main(arguments=None):
                 write_measured(part, run, tables[name])
             else:
                 gravier.write_table(part, tables[name], 9)
-    print("\n".join([*lines, *map(str, places.values()), *([str(picture)] if picture else [])]))
+    for place, one in images.items():
+        with written(place, IMAGES) as part:
+            one.write_vtk(part)
+    print("\n".join([*lines, *map(str, [*places.values(), *images]), *([str(options.plot)] if options.plot else [])]))
     return 0
 
 

@@ -1,5 +1,6 @@
 """Curves: panels of history.csv against time or another column, convergence of a solve, profiles of means over the bins of a region."""
 import re
+import textwrap
 
 import matplotlib.pyplot as plt
 import numpy
@@ -20,13 +21,15 @@ STYLES = ["-", "--", ":", "-."]
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
-         (r".*granular_temperature", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
-         (r"gravity_[xyz]", "m/s²"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
+         (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
+         (r"gravity_[xyz]", "m/s²"), (r"(gradient(_[xyz]{2})?|shear_rate|number_rate)$", "1/s"), (r"mass_rate$", "kg/s"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there
 PLACES = re.compile(r"(position|body)_[xyz]:|front_")
 #: an axis begins at 0 where the least value is below this part of the largest one; a range below this part of the values has a base of its own
 NEAR, NARROW = 0.2, 1e-3
-NAMES = {"max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
+#: of the label of a panel at most
+MOST_LINES = 4
+NAMES = {"shear_ratio": "shear stress ratio |τ|/p", "max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
 
 
 def times_of(component):
@@ -47,10 +50,12 @@ def label_of_all(name, dimensions):
 def label_of(name, dimension):
     """Name of a column of history.csv with its unit."""
     text = NAMES.get(name, name.replace("_", " "))
-    if re.search(r"(^|_)(stress_[xyz]{2}|pressure|axial_stress|lateral_stress)$", name):
+    if re.search(r"(^|_)(stress(_[xyz]{2})?|pressure|axial_stress|lateral_stress)$", name):
         return f"{text} [{'N/m' if dimension == 2 else 'Pa'}]"
     if re.search(r"(^|_)volume$", name):
         return f"{text} [{'m²' if dimension == 2 else 'm³'}]"
+    if name == "density":
+        return f"{text} [{'kg/m²' if dimension == 2 else 'kg/m³'}]"
     unit = next((unit for pattern, unit in UNITS if re.match(pattern, name)), None)
     return f"{text} [{unit}]" if unit else text
 
@@ -160,7 +165,25 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
         panel.draw(axes)
     places[-1, 0].set_xlabel(along)
     figure.align_ylabels(places[:, 0])
+    fit_labels(figure, [(axes.yaxis, axes) for axes in places[:, 0]])
     return figure
+
+
+def fit_labels(figure, labels):
+    """Break the labels of axes, given with these, `(axis, panel)`, that are longer than their panels into lines of like lengths."""
+    for _ in range(MOST_LINES):
+        figure.canvas.draw()
+        long = False
+        for axis, panel in labels:
+            upright = axis.axis_name == "y"
+            room, length = (box.height if upright else box.width for box in (panel.get_window_extent(), axis.label.get_window_extent()))
+            lines = axis.label.get_text().split("\n")
+            if length > room and len(lines) < MOST_LINES:
+                words = " ".join(lines)
+                axis.label.set_text("\n".join(textwrap.wrap(words, max(8, len(words) // (len(lines) + 1) + 2), break_long_words=False)))
+                long = True
+        if not long:
+            return
 
 
 class Curve:
@@ -299,54 +322,22 @@ def components(rows, column, dimension, axis):
     if chosen:
         return {None: values[(slice(None), *chosen)]}
     shown = [(a,) for a in range(dimension)]
-    if column == "stress":
+    if values.ndim == 3:
         shown = [(a, a) for a in range(dimension)] + [(min(a, axis), max(a, axis)) for a in range(dimension) if a != axis]
     return {"".join("xyz"[a] for a in part): values[(slice(None), *part)] for part in shown}
 
 
-def steps_of_profile(run, asked):
-    """The written steps that are asked for, in their order: `all`, or numbers, None for the last one, and pairs (first, last) for those from
-    one step to another, whose ends are None where the run has its own. There are no means at the start."""
-    written = [step for step in run.steps if step > 0]
-    if not written:
-        raise PictureError(f"{run.path}: no step with means over regions; expected one after the start")
-    chosen = set(written if asked == "all" else [])
-    for part in [] if asked == "all" else asked:
-        if not isinstance(part, tuple):
-            chosen.add(run.find_step(part))
-            continue
-        first, last = part[0] or 0, written[-1] if part[1] is None else part[1]
-        among = [step for step in written if first <= step <= last]
-        if not among:
-            raise PictureError(f"{run.path}: no written step from {first} to {last}; expected some of {written[0]} to {written[-1]}")
-        chosen.update(among)
-    return sorted(chosen)
-
-
 def draw_profile(run, name, steps, columns, mean):
     """A figure of a panel a column: means over the bins of a region against the position, of each step or, with `mean`, over them. Steps are
-    as in steps_of_profile, by default the last one or, with `mean`, all written ones. A position along the height is drawn upwards."""
+    as in `run.steps_in`, by default the last one or, with `mean`, all written ones. A position along the height is drawn upwards."""
     known = [*PROFILES, *parts_of(run.dimension)]
     for column in columns:
         if column not in known:
             raise PictureError(f"no column {column} of a profile; expected one of {', '.join(known)}")
-    steps = steps_of_profile(run, "all" if mean and not steps else steps or [None])
+    steps = run.steps_in("all" if mean and not steps else steps or [None])
     name, axis = region_with_bins(run, name, steps[-1])
     tables = [run.region_mean(name, steps)] if mean else [run.region(name, step) for step in steps]
-    several = any(len(components(tables[0], column, run.dimension, axis)) > 1 for column in columns)
-    bar = ScalarMappable(plt.Normalize(run.time(steps[0]), run.time(steps[-1])), GREYS if several else TIMES)
-    upright = axis == run.dimension - 1
-    figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
-                                  figsize=(0.9 + 2.3 * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
-                                  sharex=not upright, sharey=upright)
-    places = places.ravel()
-    if upright:
-        figure.get_layout_engine().set(wspace=0.08)
-    for axes, column in zip(places, columns):
-        draw_column(axes, run, tables, column, axis, None if len(tables) == 1 else bar.norm([run.time(step) for step in steps]))
-        grid(axes)
-        legend_above(axes, columns=4)
-    (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
+    figure, places, bar = draw_columns(tables, columns, (run.dimension, axis), [run.time(step) for step in steps])
     what = f"region {name}, step {steps[0]}" + (f" to {steps[-1]}: {'mean of ' if mean else ''}{len(steps)} states" if len(steps) > 1 else
                                                f", t = {run.time(steps[0]):.4g} s")
     if "samples" in tables[-1]:
@@ -357,10 +348,32 @@ def draw_profile(run, name, steps, columns, mean):
     return figure
 
 
-def draw_column(axes, run, tables, column, axis, times):
+def draw_columns(tables, columns, dimension_and_axis, times):
+    """A figure of tables with `centre` (d) of each row: a panel a column against the place along an axis. Several tables are states at these times, whose shades go from light to dark."""
+    dimension, axis = dimension_and_axis
+    several = any(len(components(tables[0], column, dimension, axis)) > 1 for column in columns)
+    bar = ScalarMappable(plt.Normalize(times[0], times[-1]), GREYS if several else TIMES)
+    upright = axis == dimension - 1
+    figure, places = plt.subplots(*((1, len(columns)) if upright else (len(columns), 1)), squeeze=False, constrained_layout=True,
+                                  figsize=(0.9 + min(2.3, 10.0 / len(columns)) * len(columns), 3.9) if upright else (6.2, 0.6 + 1.95 * len(columns)),
+                                  sharex=not upright, sharey=upright)
+    places = places.ravel()
+    if upright:
+        figure.get_layout_engine().set(wspace=0.08)
+    for axes, column in zip(places, columns):
+        draw_column(axes, dimension, tables, column, axis, None if len(tables) == 1 else bar.norm(times))
+        grid(axes)
+        legend_above(axes, columns=4)
+    (places[0].set_ylabel if upright else places[-1].set_xlabel)(f"{'xyz'[axis]} [m]")
+    if upright:
+        fit_labels(figure, [(axes.xaxis, axes) for axes in places])
+    return figure, places, bar
+
+
+def draw_column(axes, dimension, tables, column, axis, times):
     """Curves of a column: a colour and a dash a component, with `times` a shade a state, at that part of the time of all."""
-    upright = axis == run.dimension - 1
-    rows = [components(table, column, run.dimension, axis) for table in tables]
+    upright = axis == dimension - 1
+    rows = [components(table, column, dimension, axis) for table in tables]
     centres = [table.centre[:, axis] for table in tables]
     for k, (centre, row) in enumerate(zip(centres, rows)):
         for c, (key, values) in enumerate(row.items()):
@@ -368,9 +381,7 @@ def draw_column(axes, run, tables, column, axis, times):
             x, y = (values, centre) if upright else (centre, values)
             axes.plot(x, y, linestyle=PARTS[c % len(PARTS)], color=colour, linewidth=1.2, marker="o", markersize=2.5, label=key if k == len(rows) - 1 else None)
     shown = numpy.concatenate([values for row in rows for values in row.values()])
-    unit = "N/m" if run.dimension == 2 else "Pa"
-    label = {"velocity": "velocity [m/s]", "stress": f"stress [{unit}]"}.get(column) or label_of(column, run.dimension)
-    fit_axis(axes.xaxis if upright else axes.yaxis, shown, label, logarithms=False)
+    fit_axis(axes.xaxis if upright else axes.yaxis, shown, label_of(column, dimension), logarithms=False)
     if upright:
         # narrow panels side by side: numbers at their ends must not touch
-        axes.xaxis.set_major_locator(MaxNLocator(nbins=4))
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=4 if axes.figure.get_figwidth() > 2.2 * len(axes.figure.axes) else 3))

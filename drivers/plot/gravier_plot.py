@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
-from one_line import NEGATIVE, OneLineParser, plain, run_tool
+from one_line import NEGATIVE, OneLineParser, run_tool, steps_of
 from packing_picture import COLOURS, draw_packing
 from picture_style import SETTINGS, PictureError, save_picture
 from whole_file import PICTURES, claim
@@ -33,16 +33,6 @@ def refuse(message):
     """One line, and the status of bad input."""
     print(f"gravier_plot: {message}", file=sys.stderr)
     sys.exit(2)
-
-
-def steps_of(text):
-    """`all`, or numbers of steps and ranges FIRST:LAST with commas between, as steps_of_profile takes them; an end may be left out."""
-    if text == "all":
-        return text
-    parts = text.split(",")
-    if not all(re.fullmatch(r"\d+|\d*:\d*", part) for part in parts):
-        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected all, or steps and ranges of them such as 100,5000:8000")
-    return [tuple(int(end) if end else None for end in part.split(":")) if ":" in part else int(part) for part in parts]
 
 
 def parse(arguments):

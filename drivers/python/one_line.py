@@ -63,6 +63,16 @@ def finite(text):
     return number
 
 
+def steps_of(text):
+    """`all`, or numbers of steps and ranges FIRST:LAST with commas between, as `steps_in` of a run takes them; an end may be left out."""
+    if text == "all":
+        return text
+    parts = text.split(",")
+    if not all(re.fullmatch(r"\d+|\d*:\d*", part) for part in parts):
+        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected all, or steps and ranges of them such as 100,5000:8000")
+    return [tuple(int(end) if end else None for end in part.split(":")) if ":" in part else int(part) for part in parts]
+
+
 def run_tool(main):
     """Run a tool and exit with the status that `main` returns. SIGTERM ends it as sys.exit does, with status 143, so that it takes its drafts
     away; ^C ends it with 130, without a traceback."""

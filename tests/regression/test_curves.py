@@ -10,8 +10,8 @@ from gravier_runs import SOURCE
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 import curve_pictures  # noqa: E402
+import gravier  # noqa: E402
 import gravier_plot  # noqa: E402
-from picture_style import PictureError  # noqa: E402
 
 
 class Axes(unittest.TestCase):
@@ -102,6 +102,21 @@ class Axes(unittest.TestCase):
         plt.close(figure)
 
 
+class Labels(unittest.TestCase):
+
+    def test_long(self):
+        """Labels are no longer than their panels: long ones have several lines, and short ones one."""
+        names = ["kinetic energy", "force y: the floor of the hopper / force x: the floor of the hopper", "a/b", "a long name that goes on and on for ever / another one of the same kind [N/(m/s)]"]
+        figure = curve_pictures.draw_panels([curve_pictures.Panel(name, [([0.0, 1.0], [0.0, 1.0], None)]) for name in names])
+        figure.canvas.draw()
+        for axes, name in zip(figure.axes, names):
+            label = axes.yaxis.label
+            self.assertEqual(label.get_text().replace("\n", " "), name)
+            self.assertLessEqual(label.get_window_extent().height, axes.get_window_extent().height)
+        self.assertEqual([axes.get_ylabel().count("\n") for axes in figure.axes][::2], [0, 0])
+        plt.close(figure)
+
+
 class Steps(unittest.TestCase):
 
     def test_of_a_profile(self):
@@ -109,12 +124,12 @@ class Steps(unittest.TestCase):
         run = SimpleNamespace(path="results.h5", steps=[0, 50, 100, 150, 200], find_step=lambda step: 200 if step is None else step)
         for text, steps in (("all", [50, 100, 150, 200]), ("150,50", [50, 150]), ("100:", [100, 150, 200]), ("60:150", [100, 150]), (":100", [50, 100]),
                             (":", [50, 100, 150, 200]), ("50,140:160", [50, 150]), ("100:150,150:", [100, 150, 200])):
-            self.assertEqual(curve_pictures.steps_of_profile(run, gravier_plot.steps_of(text)), steps, text)
-        self.assertEqual(curve_pictures.steps_of_profile(run, [None]), [200])
-        with self.assertRaisesRegex(PictureError, "results.h5: no written step from 110 to 140; expected some of 50 to 200"):
-            curve_pictures.steps_of_profile(run, [(110, 140)])
-        with self.assertRaisesRegex(PictureError, "no step with means over regions; expected one after the start"):
-            curve_pictures.steps_of_profile(SimpleNamespace(path="results.h5", steps=[0]), "all")
+            self.assertEqual(gravier.Run.steps_in(run, gravier_plot.steps_of(text)), steps, text)
+        self.assertEqual(gravier.Run.steps_in(run, [None]), [200])
+        with self.assertRaisesRegex(gravier.ResultsError, "results.h5: no written step from 110 to 140; expected some of 50 to 200"):
+            gravier.Run.steps_in(run, [(110, 140)])
+        with self.assertRaisesRegex(gravier.ResultsError, "no step after the start; expected one at least"):
+            gravier.Run.steps_in(SimpleNamespace(path="results.h5", steps=[0]), "all")
         for text in ("", "a", "1:2:3", "-5", "1,,2", "1.5"):
             with self.assertRaisesRegex(gravier_plot.argparse.ArgumentTypeError, "expected all, or steps and ranges of them such as 100,5000:8000"):
                 gravier_plot.steps_of(text)

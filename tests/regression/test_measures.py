@@ -17,6 +17,7 @@ from gravier.wall_tests import sine_of_means
 matplotlib.use("Agg")
 sys.path.insert(0, os.path.join(SOURCE, "drivers/plot"))
 from curve_pictures import draw_history  # noqa: E402
+from measure_pictures import draw_measured  # noqa: E402
 
 R = 0.01
 
@@ -512,6 +513,28 @@ class Command(RunTestCase):
         done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "walls.csv", directory=self.directory, environment=ENVIRONMENT)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertEqual(done.stderr, "gravier_plot: results/walls.csv: No such file or directory; expected a table that a run wrote\n")
+
+    def test_pictures_of_tables(self):
+        """Each kind of table has a picture with a panel for each measure, with its unit; curves that a table does not have are left out. The command draws it."""
+        run = gravier.Run(os.path.join(self.directory, "results"))
+        rows = {name: np.linspace(0.1, 0.2, 5) for name in ("step", "time", "axial_strain", "volumetric_strain", "void_ratio", "axial_stress", "lateral_stress", "sin_phi", "left_mass", "mass_rate",
+                                                             "number_rate", "height", "length", "run_out", "angle")}
+        for kind, table, dimension, labels, lines in (
+                ("heap", gravier.heap(run), 2, ["ends [m]", "size [m]", "run-out", "angle [degrees]"], [2, 2, 1, 2]), ("heap", gravier.Table(rows), 3, ["size [m]", "run-out", "angle [degrees]"], [2, 1, 1]),
+                ("mixing", gravier.mixing(run), 2, ["mixing M", "segregation", "height difference [m]"], [2, 1, 1]),
+                ("walls", gravier.Table(rows), 3, ["stress [Pa]", "sin φ", "volumetric strain", "void ratio"], [2, 1, 1, 1]),
+                ("walls", gravier.Table(rows), 2, ["stress [N/m]", "sin φ", "volumetric strain", "void ratio"], [2, 1, 1, 1]),
+                ("outflow", gravier.Table(rows), 2, ["mass that has left [kg]", "mass rate [kg/s]", "grains a second [1/s]"], [1, 1, 1])):
+            with self.subTest(kind, dimension=dimension):
+                figure = draw_measured(kind, table, dimension)
+                self.assertEqual([axes.get_ylabel() for axes in figure.axes], labels)
+                self.assertEqual([len(axes.lines) for axes in figure.axes], lines)
+                self.assertEqual(figure.axes[-1].get_xlabel(), "axial strain" if kind == "walls" else "time [s]")
+        for kind in ("heap", "mixing"):
+            done = self.measure(kind, "results", "--plot", f"{kind}.png", "--out", f"{kind}.csv")
+            self.assertEqual((done.returncode, done.stderr, done.stdout.splitlines()[-1]), (0, "", f"{kind}.png"))
+        done = self.measure("heap", "results", "--plot", "heap.csv")
+        self.assertEqual((done.returncode, done.stderr), (2, "gravier_measure: error: heap.csv: expected a name that ends in .png or .svg\n"))
 
     def test_refusals(self):
         """One line and status 2; what is there stays."""

@@ -464,7 +464,7 @@ class Pictures(RunTestCase):
         figure, axes = plt.subplots()
         states = gravier.Table({**rows, "centre": np.zeros((3, 3))})
         with unittest.mock.patch.object(axes, "plot") as plot:
-            curve_pictures.draw_column(axes, SimpleNamespace(dimension=3), [states, states], "stress", 2, [0.0, 1.0])
+            curve_pictures.draw_column(axes, 3, [states, states], "stress", 2, [0.0, 1.0])
         self.assertEqual(len({str(call.kwargs["linestyle"]) for call in plot.call_args_list[:5]}), 5)
         self.assertEqual(len({str(call.kwargs["color"]) for call in plot.call_args_list}), 10)
         plt.close(figure)

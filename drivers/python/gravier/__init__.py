@@ -10,6 +10,7 @@ from . import blocks
 from .arrays import StaleArray
 from .case import CaseError, entries, namelist, parse_namelist, run, value_text
 from .checksum import seal
+from .fields import Fields, fields, fields_of_states
 from .force_networks import contact_forces, force_directions, force_distribution
 from .heaps import heap
 from .joined_bodies import join_bodies
@@ -25,6 +26,6 @@ from .studies import study
 from .tables import ResultsError, Table, read_table, write_table
 from .wall_tests import wall_test
 
-__all__ = ["BodiesFile", "CaseError", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "contact_forces", "entries", "force_directions", "force_distribution", "heap", "join_bodies", "mixing", "namelist", "outflow", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study",
+__all__ = ["BodiesFile", "CaseError", "Fields", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
+           "contact_forces", "entries", "fields", "fields_of_states", "force_directions", "force_distribution", "heap", "join_bodies", "mixing", "namelist", "outflow", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study",
            "value_text", "wall_test", "write_bodies", "write_table"]

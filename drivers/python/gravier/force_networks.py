@@ -67,14 +67,20 @@ class Network:
         self.stress = total.T @ run._branches(step, bodies, contacts)[chosen]
 
     def _count_ends(self, contacts, row, other, pushes, counted):
-        """Neighbours of the grains that count, as the diagnostic `structure` has them: the points in which a pair touches are one neighbour."""
-        points, neighbours = np.zeros(len(counted)), np.zeros(len(counted))
-        pairs = np.unique(np.stack([contacts.candidate, contacts.antagonist], axis=1)[pushes], axis=0, return_index=True)[1]
-        for rows in (row[pushes], other[pushes]):
-            np.add.at(points, rows, 1.0)
-            np.add.at(neighbours, rows[pairs], 1.0)
+        points, neighbours = ends_of(contacts, row, other, pushes, len(counted))
         self.grains, self.neighbours = int(counted.sum()), int(neighbours[counted].sum())
         self.held = int((points[counted] > 1.5).sum())
+
+
+def ends_of(contacts, row, other, pushes, count):
+    """Points in which something pushes each of `count` bodies, the last of which stands for all boundaries, and neighbours that do. `row` and `other` are those of the contacts. Neighbours are as the
+    diagnostic `structure` has them: the points in which a pair touches are one."""
+    points, neighbours = np.zeros(count), np.zeros(count)
+    pairs = np.unique(np.stack([contacts.candidate, contacts.antagonist], axis=1)[pushes], axis=0, return_index=True)[1]
+    for rows in (row[pushes], other[pushes]):
+        np.add.at(points, rows, 1.0)
+        np.add.at(neighbours, rows[pairs], 1.0)
+    return points, neighbours
 
 
 class Window:

@@ -218,14 +218,24 @@ class Run:
         if "point" in contacts:
             found["point"] = contacts.point
         else:
-            # the velocity of the end of the step leads to its place from that in the middle
             row, _ = self._rows(bodies, contacts)
-            way = float(self.case.get("time", [{}])[0].get("theta", 0.5)) * self.time_step() * bodies.velocity[row]
-            found["point"] = bodies.position[row] - way - (bodies.radius[row] + 0.5 * contacts.gap)[:, None] * contacts.normal
+            found["point"] = self.in_the_middle(step)[0].position[row] - (bodies.radius[row] + 0.5 * contacts.gap)[:, None] * contacts.normal
         if "moment" in contacts:
             moment = np.reshape(contacts.moment, (len(contacts), 2 * self.dimension - 3))
             found["moment"] = (moment if self.dimension == 2 else along(moment, axes)) / self.time_step()
         return Table(found)
+
+    def in_the_middle(self, step=None):
+        """The bodies with their places in the middle of a step, where contacts are found, and the periodic cell if it moves, else None."""
+        bodies, cell = self.bodies(step), self.cell(step)
+        way = float(self.case.get("time", [{}])[0].get("theta", 0.5)) * self.time_step()
+        # the velocity of the end of the step leads to its place from that in the middle
+        moved = Table({**bodies, "position": bodies.position - way * bodies.velocity})
+        if cell is not None:
+            edge = cell.edge - way * cell.velocity
+            # the middle of the box, whose lengths are the diagonal, stays
+            cell = Table({**cell, "edge": edge, "origin": cell.origin + 0.5 * np.diag(cell.edge - edge)[:, None]})
+        return moved, cell
 
     def shapes(self):
         """Shapes of the bodies, a list: number k of a body is its item k - 1; empty where all are disks or spheres."""
@@ -276,6 +286,24 @@ class Run:
         rows["centre"] = 0.5 * (rows.lower + rows.upper)
         rows["pressure"] = np.trace(rows.stress, axis1=1, axis2=2) / self.dimension
         return rows
+
+    def steps_in(self, asked):
+        """The written steps that are asked for, in their order: "all" after the start, or numbers, None for the last one, and pairs (first, last) for those from one step to another, whose ends are
+        None where the run has its own."""
+        written = [int(step) for step in self.steps if step > 0]
+        if not written:
+            raise ResultsError(f"{self.path}: no step after the start; expected one at least")
+        chosen = set(written if isinstance(asked, str) and asked == "all" else [])
+        for part in [] if isinstance(asked, str) and asked == "all" else asked:
+            if not isinstance(part, tuple):
+                chosen.add(self.find_step(part))
+                continue
+            first, last = part[0] or 0, written[-1] if part[1] is None else part[1]
+            among = [step for step in written if first <= step <= last]
+            if not among:
+                raise ResultsError(f"{self.path}: no written step from {first} to {last}; expected some of {written[0]} to {written[-1]}")
+            chosen.update(among)
+        return sorted(chosen)
 
     def region_mean(self, name, steps=None):
         """The means over written steps, all after the start unless told, of a region, a row a bin with the columns of `region`. Velocities and
@@ -376,6 +404,10 @@ class Run:
         number = bodies.shape if len(shapes) > 1 else np.zeros(len(bodies), dtype=int)
         return np.array([shape.volume for shape in shapes])[number] * bodies.radius**self.dimension
 
+    def ball_volume(self):
+        """Volume of a ball of radius 1, in the plane area of a disk."""
+        return ball(self.dimension).volume
+
     def subdomain(self, step=None):
         """Subdomain that holds each body (n), from 1; from bodies.vtkhdf, which `vtk = .true.` writes."""
         step = self.find_step(step)
@@ -404,14 +436,14 @@ class Run:
             raise ResultsError(f"{self.path}: no contacts in step {self.find_step(step)}; &output contacts = .true. writes them")
         return contacts
 
-    def _arms(self, step, bodies, contacts):
+    def _arms(self, step, bodies, contacts, edges=None):
         """Row of the body, row of the contact and way from the centre to the contact, of both bodies of all contacts; of the images of a
-        body in a periodic scene the one that is nearest to the contact counts."""
+        body in a periodic scene, by the edges of the step unless told, the one that is nearest to the contact counts."""
         row, other = self._rows(bodies, contacts)
         body, contact = np.concatenate([row, other]), np.tile(np.arange(len(contacts)), 2)
         body, contact = body[body >= 0], contact[body >= 0]
         arm = contacts.point[contact] - bodies.position[body]
-        for edge in self._edges(step):
+        for edge in self._edges(step) if edges is None else edges:
             images = np.stack([arm, arm - edge, arm + edge])
             arm = images[np.argmin(np.linalg.norm(images, axis=2), axis=0), np.arange(len(arm))]
         return body, contact, arm

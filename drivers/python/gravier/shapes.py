@@ -22,6 +22,22 @@ class Piece:
         found = (self._without_repeats(face) for face in self.faces)
         return [points for points in found if len(points) >= 3]
 
+    def holds(self, points):
+        """Which points (n, d) are in the piece, with its sharp corners."""
+        if len(self.corner) <= 2:
+            first, way = self.corner[0], self.corner[-1] - self.corner[0]
+            along = np.clip((points - first) @ way / max(way @ way, np.finfo(float).tiny), 0.0, 1.0)
+            return np.linalg.norm(points - first - along[:, None] * way, axis=1) <= self.rounding
+        if self.corner.shape[1] == 2:
+            sides = np.roll(self.corner, -1, axis=0) - self.corner
+            across = (points[:, None] - self.corner)[:, :, ::-1] * sides * [-1.0, 1.0]
+            turns = across.sum(axis=2)
+            return np.all(turns >= 0.0, axis=1) | np.all(turns <= 0.0, axis=1)
+        found = np.ones(len(points), dtype=bool)
+        for face in self.polygons():
+            found &= (points - face[0]) @ np.cross(face, np.roll(face, -1, axis=0)).sum(axis=0) <= 0.0
+        return found
+
     def _without_repeats(self, face):
         points = self.corner[face]
         return points[np.any(points != np.roll(points, 1, axis=0), axis=1)]
@@ -32,6 +48,20 @@ class Shape:
 
     def __init__(self, name, size, volume, inertia, pieces):
         self.name, self.size, self.volume, self.inertia, self.pieces = name, size, volume, inertia, pieces
+
+    def points(self, count):
+        """Points that fill the shape evenly (count, d): those of a sequence of low discrepancy that are in one of its pieces."""
+        d = self.pieces[0].corner.shape[1]
+        # the roots of x^(d + 1) = x + 1, whose powers fill a square or a cube
+        steps = (1.324717957244746 if d == 2 else 1.2207440846057596)**-np.arange(1.0, d + 1.0)
+        low, high = (np.array([sign * (sign * piece.corner).max(axis=0) + sign * (piece.rounding if len(piece.corner) <= 2 else 0.0) for piece in self.pieces]) for sign in (-1.0, 1.0))
+        low, high = low.min(axis=0), high.max(axis=0)
+        found, first = np.zeros((0, d)), 0
+        while len(found) < count:
+            tried = low + (high - low) * np.mod(0.5 + np.arange(first + 1, first + 4 * count + 1)[:, None] * steps, 1.0)
+            found = np.concatenate([found, tried[np.any([piece.holds(tried) for piece in self.pieces], axis=0)]])
+            first += 4 * count
+        return found[:count]
 
     def polygons(self):
         return [points for piece in self.pieces for points in piece.polygons()]

@@ -33,18 +33,22 @@ class Table(dict):
         return Table({name: values[:blocks * rows].reshape(blocks, rows, *values.shape[1:]).mean(axis=1) for name, values in self.items()})
 
     def frame(self):
-        """A pandas DataFrame; component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner or edge 1 NAME_1y. Impulses
-        and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""
+        """A pandas DataFrame of the columns of `flat`."""
         try:
             import pandas
         except ImportError:
             raise ResultsError("frame: there is no pandas; expected a python3 that has it, or the arrays of the table") from None
 
+        return pandas.DataFrame(self.flat())
+
+    def flat(self):
+        """Columns of one number a row, by name: component x of a column becomes NAME_x, component x, y of a tensor NAME_xy, component y of corner or edge 1 NAME_1y. Impulses
+        and moments of contacts have NAME_n, NAME_t, NAME_s, quaternions NAME_w, NAME_x, NAME_y, NAME_z; what turns in the plane turns about z."""
         columns = {}
         for name, values in self.items():
             parts = values.reshape(len(values), int(np.prod(values.shape[1:])))
             columns.update({name + ending: part for ending, part in zip(self._endings(name, values.shape[1:]), parts.T)})
-        return pandas.DataFrame(columns)
+        return columns
 
     def _endings(self, name, shape):
         """What the components of a column of this shape have behind its name."""
