@@ -224,7 +224,7 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
     for run, history in zip(runs, histories):
         if len(history) == 0:
             raise PictureError(f"{run.directory / table}: no row; expected one at least")
-        for name in [*(name for column in columns for name in Curve(column, history).names), against]:
+        for name in [name for column in [*columns, against] for name in Curve(column, history).names]:
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     if rows > 1:
@@ -232,10 +232,11 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
     curves = [Curve(column, histories[0]) for column in columns]
-    panels = [Panel(curve.label(dimensions), [(history[against], curve.values(history), name if k == 0 else None) for name, history in zip(names, histories)],
+    along = Curve(against, histories[0])
+    panels = [Panel(curve.label(dimensions), [(along.values(history), curve.values(history), name if k == 0 else None) for name, history in zip(names, histories)],
                     counts=curve.text == "iterations", places=curve.below is None and bool(PLACES.match(curve.above)))
               for k, curve in enumerate(curves)]
-    return draw_panels(panels, along=label_of_all(against, dimensions))
+    return draw_panels(panels, along=along.label(dimensions))
 
 
 def velocity_scale(run, step):

@@ -63,7 +63,7 @@ def parse(arguments):
     history._negative_number_matcher = re.compile(r"-[A-Za-z]")
     history.add_argument("--table", default="history.csv", metavar="FILE", help="another table in each DIR, such as mixing.csv of gravier_measure")
     history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps after each other in the place of single steps")
-    history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain")
+    history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain, or its opposite -COLUMN")
     convergence = kinds.add_parser("convergence", parents=[several], help="residual and jump of a solve (&output trace = .true.)")
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")
     profile = kinds.add_parser("profile", parents=[one], help="means over the bins of a &region against the position")

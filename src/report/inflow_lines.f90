@@ -164,11 +164,11 @@ contains
     else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
       text = text//", all that its rate owes"
     end if
-    if (insertion%most_grains < huge(1_i8) .and. .not. insertion%is_complete()) text = text//"; its count is "// &
-      & to_text(insertion%most_grains)
     if (insertion%put_off > 0) text = text//"; grains were put off in "//counted(insertion%put_off, "step")
     if (insertion%held_back > 0) text = text//"; more than "//to_text(most_a_step)//" were to enter in "// &
       & counted(insertion%held_back, "step")
+    if (insertion%most_grains < huge(1_i8) .and. insertion%entered < insertion%most_grains) text = text//"; "//to_text( &
+      & insertion%most_grains - insertion%entered)//" of its count of "//to_text(insertion%most_grains)//" are still to enter"
   end function insertion_line
 
   !> That grains which rates owe have not entered, for the last words of a log; empty where they are few.

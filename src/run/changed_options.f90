@@ -21,8 +21,8 @@ module gravier_changed_options
     & "cell_shear_rate cell_pressure cell_shear_stress cell_table cell_table_repeats cell_inertia "
   character(len=*), parameter :: boundary_keys = coefficients//"velocity rotation oscillation rotation_oscillation frequency "// &
     & "phase free force pressure mass table table_repeats remove_at "
-  !> keys of a law that may not, since bonds are made at the start; all others are coefficients
-  character(len=*), parameter :: fixed_law_keys = " materials kind bond_distance "
+  !> keys of a law that may not, since bonds and bridges are made at the start; all others are coefficients
+  character(len=*), parameter :: fixed_law_keys = " materials kind bond_distance bridge_distance "
 
   !> The options of a checkpoint and of an input file, and where these are.
   type :: comparison_t

@@ -22,7 +22,7 @@ module gravier_checkpoint
   use gravier_diagnostic_registry, only: diagnostic_holder_t, registered_diagnostics
   use gravier_partition, only: head_words, head_record
   use gravier_simulation, only: simulation_t
-  use gravier_checkpoint_scene, only: check_scene, check_steps, fixed_options
+  use gravier_checkpoint_scene, only: check_scene, check_steps, check_removals, fixed_options
   use gravier_checkpoint_tables, only: save_tables, load_partition, load_grains, pack_boundaries
   implicit none
   private
@@ -219,6 +219,7 @@ contains
     call simulation%make_subdomains()
     call load_partition(simulation, file, path, error)
     call load_grains(simulation, file, path, builds, error)
+    if (simulation%changes /= "") call check_removals(simulation, path, error)
     if (.not. allocated(error) .and. simulation%changes /= "") call simulation%wake()
     if (.not. allocated(error)) call simulation%start_diagnostics()
     call load_diagnostics(simulation%diagnostics, file, error)

@@ -7,11 +7,11 @@ module gravier_checkpoint_scene
   use gravier_shape_names, only: library_digest
   use gravier_time_table, only: time_table_t
   use gravier_changed_options, only: compare_options, next_line, group_end, tables_group, files_group
-  use gravier_config, only: write_active
+  use gravier_config, only: config_t, write_active
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: check_scene, check_steps, fixed_options
+  public :: check_scene, check_steps, check_removals, fixed_options
 
   character(len=*), parameter :: newline = achar(10)
   !> groups of the input that a run goes on with as it began, but for what may change where this is asked for
@@ -45,6 +45,7 @@ contains
       call expect(.not. abs(theta - config%time%theta) > 0.0_dp, "&time theta", to_text(theta))
       if (.not. allocated(error)) call compare_options(path, before, config%file, &
         & fixed_options(simulation), accepts, simulation%changes, error)
+      call check_velocities(simulation%changes, simulation%config, error)
     end associate
     if (allocated(error)) return
     if (grains /= simulation%n_first .or. abs(radius - simulation%decomposition%rule%mean_radius) > 0.0_dp) call raise(error, &
@@ -63,6 +64,50 @@ contains
     end subroutine expect
 
   end subroutine check_scene
+
+  !> Refuse another velocity of a boundary along components that forces move: it goes on with the one that it has.
+  subroutine check_velocities(changes, config, error)
+    character(len=*), intent(in) :: changes
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: b
+
+    do b = 1, size(config%boundaries)
+      associate (given => config%boundaries(b))
+        if (.not. any(given%free .and. abs(given%velocity) > 0.0_dp)) cycle
+        if (index(changes, title_of_boundary(given%name)//" velocity = ") == 0) cycle
+        call raise(error, status_input, config%file//": "//title_of_boundary(given%name)//" velocity: expected 0 along what "// &
+          & "forces move: there the boundary goes on with the velocity that it has")
+        return
+      end associate
+    end do
+  end subroutine check_velocities
+
+  !> Refuse another time of removal for a boundary that is no longer there.
+  subroutine check_removals(simulation, path, error)
+    type(simulation_t), intent(in) :: simulation
+    !> of the checkpoint
+    character(len=*), intent(in) :: path
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: b
+
+    if (allocated(error)) return
+    do b = 1, size(simulation%config%boundaries)
+      associate (boundary => simulation%decomposition%boundaries(simulation%n_walls + b), given => simulation%config%boundaries(b))
+        if (boundary%present .or. given%remove_at <= simulation%time) cycle
+        call raise(error, status_input, simulation%config%file//": "//title_of_boundary(given%name)//" remove_at: expected the "// &
+          & "time at which it was removed, since it is no longer there in "//path)
+        return
+      end associate
+    end do
+  end subroutine check_removals
+
+  !> A boundary as the changes have it.
+  function title_of_boundary(name) result(title)
+    character(len=*), intent(in) :: name
+    character(len=:), allocatable :: title
+    title = "&boundary '"//trim(name)//"'"
+  end function title_of_boundary
 
   !> Refuse a checkpoint that is beyond the last step of the input.
   subroutine check_steps(simulation, step, path, error)

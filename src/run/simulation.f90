@@ -217,8 +217,8 @@ contains
         self%decomposition%entry_box(d, 2) = maxval(insertions%upper(d))
       end do
       if (self%velocity_scale%mass > 0.0_dp) return
-      ! the mean of all that enter in the long run, whatever the number of steps is: rates without an end outweigh all bounds, and one
-      ! grain of each insertion counts where one has neither a rate nor a bound
+      ! the mean of all that enter in the long run, whatever the number of steps is: rates without an end outweigh all bounds, and
+      ! one grain of each insertion counts where one has neither a rate nor a bound
       do d = 1, size(insertions)
         share(d) = insertions(d)%planned(long_run)
       end do

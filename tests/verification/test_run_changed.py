@@ -195,12 +195,28 @@ with gravier.Simulation(case, quiet=True) as s:
                               ({"scene": {"gravity": [0.0, -1.0], "rotation": False}}, f"rotation = .false.: expected rotation = .true., {other}"),
                               ({"boundary": longer["boundary"][:2]}, f"&(tables): expected &boundary, {other}"),
                               ({"boundary": [{**longer["boundary"][0], "point": [0.0, -0.02]}, *longer["boundary"][1:]]}, "point = 0.0, -0.02, 0.0: expected point = "),
+                              ({"boundary": with_boundary(longer, 2, velocity=[0.0, 1.0, 0.0])["boundary"]}, "case.nml: &boundary 'lid' velocity: expected 0 along what forces "
+                               "move: there the boundary goes on with the velocity that it has\n"),
                               ({"scene": {"friction": 0.0}}, "case.nml: no grain turns without friction, and those of results/checkpoint.h5 turn: expected a friction "
                                "above 0 of some contacts, however small\n")):
             self.assert_refused(self.go_on(directory, merged(longer, groups), "--changed"), words)
         self.assert_refused(gravier("--changed", "case.nml", directory=directory), "--changed without --restart: expected both, since a run that begins has nothing "
                             "to differ from; see gravier --help\n")
         self.assertEqual(differences(before, written(directory)), [])
+
+    def test_removed_boundaries(self):
+        """A boundary that is gone does not come back."""
+        case = with_boundary(PRESSED, 1, remove_at=0.01)
+        directory = self.here("removed")
+        self.assert_status(run_case(case, directory=directory), 0)
+        kept = merged(with_boundary(case, 1, remove_at=1.0), {"time": {"steps": 40}})
+        self.assert_refused(self.go_on(directory, kept, "--changed"), "case.nml: &boundary 'left' remove_at: expected the time at which it was removed, since it is "
+                            "no longer there in results/checkpoint.h5\n")
+        # one that is still there goes later
+        later = merged(with_boundary(case, 0, remove_at=0.035), {"time": {"steps": 40}})
+        run = self.go_on(directory, later, "--changed")
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"\nremoved +.*'floor'")
 
     def test_nothing_changed(self):
         """The option beside an unchanged case, and where there is no checkpoint."""

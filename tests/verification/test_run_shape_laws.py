@@ -303,6 +303,27 @@ class ShapeLaws(RunTestCase):
                     self.assertGreater(history["elastic_energy"].max(), 0.5 * scale)
                     self.assertLess(np.abs(energy - energy[0]).max(), (5e-3 if dimension == 2 else 2e-2) * scale)
 
+    def test_stress_between_walls(self):
+        """The mean stress of a block on springs between a floor and a lid is that of the forces on them: overlaps take no part of the height."""
+        for dimension, shape in ((2, "polygon -0.06 -0.03 0.06 -0.03 0.06 0.03 -0.06 0.03"), (3, "box 0.12 0.12 0.06")):
+            directory = prepare(self.here(f"pressed {dimension}"), dimension, [body("s", up(dimension, 0.03)), body("s", up(dimension, 0.09))],
+                                f"shape s\nrounding 0.003\n{shape}\n")
+            law = {"materials": "m", "kind": "elastic", "friction": 0.3, "normal_stiffness": 1e5, "spring_restitution": 0.05}
+            lid = {**plane(dimension), "name": "lid", "material": "m", "point": up(dimension, 0.12), "normal": up(dimension, -1.0), "free": [axis == dimension - 1 for axis in
+                   range(dimension)], "mass": 5.0, "force": up(dimension, -200.0)}
+            case = shaped_case(dimension, [{**plane(dimension), "material": "m"}, lid],
+                               {"scene": {"density": 1000.0, "friction": 0.3}, "material": [{"name": "m"}], "law": [law], "solver": {"accuracy": 1e-6},
+                                "time": {"step": 2e-4, "steps": 4000}, "output": {"every": 4000, "stress": True, "boundary_forces": True}})
+            run = run_case(case, 1, directory)
+            self.assert_status(run, 0)
+            history, axis = run.history(), "xyz"[dimension - 1]
+            bodies = run.results()["/steps/4000/bodies/position"][:, dimension - 1], run.results()["/steps/4000/bodies/mass"]
+            height = history[f"position_{axis}:lid"][-1]
+            # the lid is pressed in by overlaps of this part of the height
+            self.assertGreater(0.12 - height, 1e-2 * height)
+            moment = 200.0 * height + 9.81 * (bodies[0] * np.ravel(bodies[1])).sum()
+            np.testing.assert_allclose(history[f"stress_{axis}{axis}"][-1] * history["volume"][-1], moment, rtol=1e-6)
+
     def test_slope(self):
         """A block on a slope sticks below the angle of friction, and slides as Coulomb has it above; materials have friction of their own."""
         slope, steps, h = 0.4, 50, 1e-3

@@ -25,6 +25,7 @@ module gravier_time_table
     procedure :: at => time_table_at
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
+    procedure :: miss_way => time_table_miss_way
     procedure :: shortest_half_cycle => time_table_shortest_half_cycle
     procedure :: digest => time_table_digest
   end type time_table_t
@@ -255,6 +256,66 @@ contains
       if (whole > 0.0_dp) share = min(share, kept/whole)
     end do
   end function time_table_kept_variation
+
+  !> By how much the way that steps make at the rates of column `k` misses the integral of the column at the end of a run, and the
+  !> range of that integral at the rows and at the end. Steps make h (theta v(end) + (1 - theta) v(begin)); a jump within a step is
+  !> then a ramp of its length, and jumps of a table that repeats may add up. The table has been read.
+  pure subroutine time_table_miss_way(self, k, step, theta, steps, missed, range)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k, steps
+    !> [s], weight of the end of a step
+    real(dp), intent(in) :: step, theta
+    !> [unit of the column times s]
+    real(dp), intent(out) :: missed, range
+    real(dp) :: way, exact, begin, low, high, now, before
+    integer :: n, row
+
+    way = 0.0_dp
+    before = self%at(k, 0.0_dp)
+    do n = 1, steps
+      now = self%at(k, n*step)
+      way = way + step*(theta*now + (1.0_dp - theta)*before)
+      before = now
+    end do
+    begin = integral(self, k, 0.0_dp)
+    exact = integral(self, k, steps*step) - begin
+    missed = abs(way - exact)
+    low = min(0.0_dp, exact)
+    high = max(0.0_dp, exact)
+    way = 0.0_dp
+    do row = 1, size(self%time) - 1
+      if (self%time(row) >= steps*step) exit
+      way = way + 0.5_dp*(self%time(row + 1) - self%time(row))*(self%value(k, row) + self%value(k, row + 1))
+      low = min(low, way - begin)
+      high = max(high, way - begin)
+    end do
+    range = high - low
+  end subroutine time_table_miss_way
+
+  !> Integral of column `k` from the first row to a time [unit of the column times s].
+  pure real(dp) function integral(self, k, time) result(sum_until)
+    type(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: time
+    real(dp) :: at, cycles
+    integer :: row, last
+
+    last = size(self%time)
+    at = time
+    cycles = 0.0_dp
+    if (self%period > 0.0_dp .and. time > self%time(last)) then
+      cycles = real(floor((time - self%time(1))/self%period, i8), dp)
+      at = time - cycles*self%period
+    end if
+    sum_until = min(at - self%time(1), 0.0_dp)*self%value(k, 1) + max(at - self%time(last), 0.0_dp)*self%value(k, last)
+    do row = 1, last - 1
+      associate (from => self%time(row), to => self%time(row + 1))
+        if (at > from) sum_until = sum_until + 0.5_dp*(min(at, to) - from)*(self%value(k, row) + self%at(k, min(at, to)))
+        sum_until = sum_until + 0.5_dp*cycles*(to - from)*(self%value(k, row) + self%value(k, row + 1))
+      end associate
+    end do
+  end function integral
 
   !> A number that tells tables of other columns, times or values apart; the table has been read.
   pure integer(i8) function time_table_digest(self) result(digest)

@@ -92,7 +92,7 @@ contains
     do size_class = 0, last_class
       call place_class(comm, placement, size_class, left)
       if (left > 0) then
-        call raise_too_dense(comm, box, radius, left, error)
+        call raise_too_dense(comm, box, radius, placement%class_radius(size_class + 1), left, error)
         return
       end if
     end do
@@ -115,16 +115,17 @@ contains
   end subroutine check_width
 
   !> Say how full the box was to be. Collective.
-  subroutine raise_too_dense(comm, box, radius, left, error)
+  subroutine raise_too_dense(comm, box, radius, least, left, error)
     type(communicator_t), intent(in) :: comm
     class(sample_box_t), intent(in) :: box
     real(dp), intent(in), contiguous :: radius(:)
-    !> grains of the class that was given up
+    !> radius above which grains were tried [m], and those of them without a place
+    real(dp), intent(in) :: least
     integer(i8), intent(in) :: left
     type(error_t), allocatable, intent(inout) :: error
     real(dp), allocatable :: volume(:)
     real(dp) :: fraction
-    integer(i8) :: total
+    integer(i8) :: total, tried
     integer :: k
 
     allocate (volume(size(radius)))
@@ -133,9 +134,10 @@ contains
     end do
     fraction = comm%sum_real(volume)/box%volume()
     total = comm%total(size(radius, kind=i8))
-    call raise(error, status_input, box%too_many(fraction)//": of "//to_text(total)// &
-      & " grains, "//to_text(left)//" found no place; random places take up to "//merge("0.53", "0.35", box%nd == 2)// &
-      & " of grains of one radius, less in a narrow box")
+    tried = comm%total(count(radius > least, kind=i8))
+    call raise(error, status_input, box%too_many(fraction)//": of "//to_text(total)//" grains, the largest "//to_text(tried)// &
+      & " were tried, and "//to_text(left)//" of these found no place; random places take up to "// &
+      & merge("0.53", "0.35", box%nd == 2)//" of grains of one radius, less in a narrow box")
   end subroutine raise_too_dense
 
   !> Give the grains of one class their places. Collective.

@@ -6,8 +6,8 @@
 !> solves, that is motion and no error. What moves then against the bodies may be error as before: the spread, and the way of
 !> boundaries against the centre of mass.
 !>
-!> Bodies that move while most of the others rest hide neither their motion nor that of boundaries: where bodies with half of the mass
-!> of all that are awake are slow, and move by less than the errors of solves in the mean, the step counts as one of rest for them.
+!> Bodies that move while most of the others rest do not hide the errors of these: where bodies with half of the mass of all that
+!> are awake are slow, and move by less than the errors of solves in the mean, the step counts for them.
 !>
 !> The spread is that of a uniform velocity gradient, A = sum m (v - v_c) (x - x_c)^T/(M R), with the centre of mass c, the mass M
 !> and the radius of gyration R of the grains. Its norm is at most the root mean square of v - v_c. Along periodic axes grains have
@@ -67,8 +67,8 @@ contains
     drift_words = 2 + 9*(of_cell + n_boundaries)
   end function drift_words
 
-  !> Add the ways of a step that has ended, if its solve has converged and the motion of its bodies against each other, or of most of
-  !> them, is not told from the error of the solve. Collective.
+  !> Add the ways of a step that has ended, if its solve has converged and the motion of its bodies against each other, or of most
+  !> of them, is not told from the error of the solve. Collective.
   subroutine drift_note(self, decomposition, physics, impulses, mass, scale, solve)
     class(drift_t), intent(inout) :: self
     !> with the velocities of the end of the step

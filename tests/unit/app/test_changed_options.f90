@@ -133,7 +133,7 @@ contains
     ! as many as the lists of gravier_changed_options have
     call check_equal(n(1), 21, "keys of &scene that may change")
     call check_equal(n(2), 18, "keys of &boundary that may change")
-    call check_equal(n(3), 3, "keys of &law that may not")
+    call check_equal(n(3), 4, "keys of &law that may not")
     do k = 1, size(of_scene)
       call check(may_change("&scene", trim(of_scene(k))), trim(of_scene(k))//" may change")
     end do

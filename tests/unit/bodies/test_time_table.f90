@@ -103,6 +103,18 @@ contains
     call check_close(table%at(2, 9.0_dp), 5.0_dp, 0.0_dp, "one row, after")
   end subroutine test_one_row
 
+  !> The way of the first column.
+  subroutine check_way(step, theta, steps, missed, range, what)
+    real(dp), intent(in) :: step, theta, missed, range
+    integer, intent(in) :: steps
+    character(len=*), intent(in) :: what
+    real(dp) :: found(2)
+
+    call table%miss_way(1, step, theta, steps, found(1), found(2))
+    call check_close(found(1), missed, 1.0e-12_dp, what//", missed")
+    call check_close(found(2), range, 1.0e-12_dp, what//", range")
+  end subroutine check_way
+
   !> A triangle of period 2 that begins at 0: steps of 1/2 and 1 keep its ups and downs, those of 2 none of them, and those of 3/2 a
   !> third of them. A jump between two steps is kept; what is behind the last step does not count.
   subroutine test_variation()
@@ -118,6 +130,11 @@ contains
     ! 0, 1/2, 1, 1/2, 0
     call check_close(table%kept_variation(1.5_dp, 4), 2.0_dp/6.0_dp, 1.0e-12_dp, "steps between keep a part")
     call check_close(table%kept_variation(2.0_dp, 0), 1.0_dp, 1.0e-12_dp, "no step loses nothing")
+    call check_way(1.0_dp, 0.5_dp, 6, 0.0_dp, 3.0_dp, "steps that are those of the rows make the way of the table")
+    call check_way(2.0_dp, 0.5_dp, 3, 3.0_dp, 3.0_dp, "steps of the period make none")
+    ! 0, 1/2, 1 for times up to 3, and 1/2 more by the velocity at the end
+    call check_way(1.5_dp, 0.5_dp, 2, 0.0_dp, 1.5_dp, "steps between, whose errors cancel")
+    call check_way(1.5_dp, 1.0_dp, 2, 0.75_dp, 1.5_dp, "the velocity at the end of a step")
     call read_table("time,vx"//newline//"1.1,0"//newline//"1.2,3"//newline//"9,3"//newline//"9.1,0"//newline//"9.2,3"// &
       & newline, error)
     call check(.not. allocated(error), "a jump")
