@@ -5,7 +5,8 @@ module gravier_interface
   use gravier_sorting, only: argsort, argsort_rows, find_sorted
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_shared_exchange, only: shared_part_t
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   implicit none
@@ -92,7 +93,7 @@ contains
     do s = 1, size(part)
       call number_shared_first(problem%sub(s), part(s)%body(1:part(s)%n_shared))
     end do
-    call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%kernels%nv)
+    call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%nv)
   end subroutine find_interface
 
   subroutine columns_init(self, sub, n_home)

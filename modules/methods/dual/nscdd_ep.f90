@@ -218,7 +218,7 @@ contains
     class(nscdd_ep_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
     integer, intent(in) :: s
-    real(dp) :: load(problem%kernels%nv)
+    real(dp) :: load(problem%nv)
     integer :: k, b
 
     associate (part => problem%shared%part(s), sub => problem%sub(s), change => self%change(s))

@@ -10,7 +10,8 @@ module gravier_enriched_matrix
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: mass_column
   use gravier_contact_operator, only: find_local_operator
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method_options, only: held_list_t
   use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
@@ -138,7 +139,7 @@ contains
         call make_diagonal_blocks(part%direction, sub%n_contacts, block)
         call assemble(problem%kernels, sub, block, .false., entries)
         before = part%factor%factorisations
-        call part%factor%factorise(sub%n_bodies*problem%kernels%nv, entries%row, entries%column, entries%value, error)
+        call part%factor%factorise(sub%n_bodies*problem%nv, entries%row, entries%column, entries%value, error)
         changed = changed .or. part%factor%factorisations > before
       end associate
     end do
@@ -201,7 +202,7 @@ contains
 
     if (problem%sub(s)%n_bodies == 0) return
     call assemble(problem%kernels, problem%sub(s), block, self%general, entries)
-    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%kernels%nv, entries%row, entries%column, &
+    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%nv, entries%row, entries%column, &
       & entries%value, error)
   end subroutine enriched_matrix_factorise_blocks
 
@@ -299,7 +300,7 @@ contains
     real(dp), allocatable :: flat(:, :)
     integer :: k, d, nv
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     allocate (flat(nv*problem%sub(s)%n_bodies, 1))
     do k = 1, problem%sub(s)%n_bodies
       flat((k - 1)*nv + 1:k*nv, 1) = b(:, k)
@@ -322,11 +323,11 @@ contains
     type(error_t), allocatable, intent(inout) :: error
 
     associate (part => self%part(s), sub => problem%sub(s))
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, part%contact_work)
+      call sub%contact_velocity(problem%kernels, sub%velocity, part%contact_work)
       part%contact_work(:, :, :) = part%direction*(part%law_velocity - part%contact_work)
       if (self%direction%active_only) call drop_inactive(problem%kernels, sub, part%contact_work)
       part%body_work(:, :) = 0.0_dp
-      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
+      call sub%add_reaction(problem%kernels, part%contact_work, part%body_work)
       call self%solve(problem, s, part%body_work, error)
     end associate
   end subroutine enriched_matrix_enrich

@@ -67,7 +67,7 @@ contains
     end do
     call problem%comm%agree(error)
     if (allocated(error)) return
-    call assemble(self%blocks, problem%kernels%nv, matrix%general, row, column, value)
+    call assemble(self%blocks, problem%nv, matrix%general, row, column, value)
     call self%factor%factorise(self%n, row, column, value, error)
     call problem%comm%agree(error)
   end subroutine interface_direct_prepare
@@ -82,7 +82,7 @@ contains
     integer(i8) :: mine, next
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     mine = 0
     do s = 1, size(problem%sub)
       associate (part => problem%shared%part(s))
@@ -138,7 +138,7 @@ contains
     real(dp), allocatable :: columns(:, :)
     integer :: k, d, nv, from, width, j
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     allocate (dof(nv*problem%shared%part(s)%n_shared))
     do k = 1, problem%shared%part(s)%n_shared
       do d = 1, nv
@@ -265,7 +265,7 @@ contains
     real(dp), intent(inout), contiguous :: rows(:)
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     do s = 1, size(r)
       do k = 1, size(self%blocks(s)%upper)
         if (self%blocks(s)%upper(k) == 0) cycle
@@ -285,7 +285,7 @@ contains
     real(dp), intent(out) :: size_now(2)
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     size_now(:) = 0.0_dp
     do s = 1, size(x)
       associate (part => problem%shared%part(s), block => self%blocks(s))

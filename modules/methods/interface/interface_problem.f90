@@ -68,8 +68,8 @@ contains
 
     allocate (field(size(problem%sub)))
     do s = 1, size(field)
-      allocate (field(s)%upper(problem%kernels%nv, problem%shared%part(s)%n_shared), &
-        & field(s)%lower(problem%kernels%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
+      allocate (field(s)%upper(problem%nv, problem%shared%part(s)%n_shared), &
+        & field(s)%lower(problem%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
     end do
   end subroutine make_field
 

@@ -224,7 +224,7 @@ contains
     call problem%evaluate()
     do s = 1, size(problem%sub)
       associate (part => self%part(s), sub => problem%sub(s))
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, part%v)
+        call sub%contact_velocity(problem%kernels, sub%v_global, part%v)
         call part%law%evaluate(problem%kernels, sub, part%v, self%weight%alpha, squares(s))
       end associate
     end do
@@ -321,9 +321,9 @@ contains
       call load_transpose(problem, s, self%f(s), self%matrix)
       associate (part => self%part(s), sub => problem%sub(s), work => self%matrix%part(s)%body_work)
         work(:, :) = -work
-        call problem%kernels%add_reaction(sub%pair, sub%hot, part%law%offset, work)
+        call sub%add_reaction(problem%kernels, part%law%offset, work)
         call self%matrix%solve(problem, s, work, singular)
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, work, part%v)
+        call sub%contact_velocity(problem%kernels, work, part%v)
         call part%law%find_step(part%v, part%step)
         sub%velocity(:, :) = sub%v_global + work
       end associate
@@ -342,7 +342,7 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), work => self%matrix%part(s)%body_work)
         work(:, :) = 0.0_dp
-        call problem%kernels%add_reaction(sub%pair, sub%hot, self%part(s)%law%offset, work)
+        call sub%add_reaction(problem%kernels, self%part(s)%law%offset, work)
         call self%matrix%solve(problem, s, work, error)
       end associate
     end do

@@ -158,14 +158,14 @@ contains
     do s = 1, size(problem%sub)
       call problem%own_reactions(s)
       call problem%shared%load(s, problem%sub(s)%reaction)
-      allocate (load(s)%value(problem%kernels%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
+      allocate (load(s)%value(problem%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       do k = 1, problem%shared%part(s)%n_shared
         call problem%shared%add_copies(s, k, load(s)%value(:, k))
-        do d = 1, problem%kernels%nv
+        do d = 1, problem%nv
           if (.not. problem%sub(s)%moves(d, problem%shared%part(s)%body(k))) load(s)%value(d, k) = 0.0_dp
         end do
       end do
@@ -217,7 +217,7 @@ contains
     type(neighbour_load_t), intent(inout) :: load(:)
     !> counts how often the factor is lowered
     type(work_t), intent(inout) :: work
-    real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2), factor
+    real(dp) :: change(problem%nv), parts(2, size(load)), sums(2), factor
     integer :: s, k, b
 
     call problem%shared%pass()

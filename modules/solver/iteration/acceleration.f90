@@ -103,7 +103,7 @@ contains
 
     acceleration = acceleration_t(on=.true.)
     call acceleration%choose_steering(problem%n_contacts)
-    if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
+    if (problem%has_compliance()) acceleration%most = most_extrapolation(problem)
     allocate (acceleration%part(size(problem%sub)))
     do s = 1, size(problem%sub)
       acceleration%part(s)%impulse = problem%sub(s)%impulse
@@ -121,7 +121,7 @@ contains
 
     least = 1.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), row => problem%kernels%row)
+      associate (sub => problem%sub(s), row => problem%row)
         do c = 1, sub%n_contacts
           associate (contact => sub%hot(lane_of(c), :, block_of(c)))
             least = min(least, contact(row%compliance_n)*contact(row%per_wnn), contact(row%compliance_t)*contact(row%per_wtt))
@@ -249,7 +249,7 @@ contains
 
     if (acceleration%whole()) then
       factors(:) = 1.0_dp
-    else if (problem%kernels%nd == 2) then
+    else if (problem%nd == 2) then
       factors(:) = relaxation_2d
     else
       factors(:) = relaxation_3d

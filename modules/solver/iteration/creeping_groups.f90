@@ -8,7 +8,8 @@ module gravier_creeping_groups
   use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: apply_inverse_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_disjoint_sets, only: first_of, join_sets
   implicit none
@@ -43,7 +44,7 @@ contains
     type(kept_impulses_t) :: now(size(problem%sub))
     integer :: s
 
-    if (problem%kernels%friction_row == 0) return
+    if (problem%friction_row == 0) return
     call copy_impulses(problem, now)
     do s = 1, size(problem%sub)
       problem%sub(s)%impulse(:, :, :) = problem%sub(s)%impulse - earlier(s)%value
@@ -142,7 +143,7 @@ contains
     integer :: d
 
     force = 0.0_dp
-    do d = 1, problem%kernels%nf
+    do d = 1, problem%nf
       force = force + impulse(lane_of(c), d, block_of(c))**2
     end do
     force = sqrt(force)
@@ -163,9 +164,9 @@ contains
     do c = 1, sub%n_contacts
       if (force(problem, sub%impulse, c) < least) cycle
       counts(1) = counts(1) + 1
-      allowed = sub%hot(lane_of(c), problem%kernels%friction_row, block_of(c))*now(lane_of(c), 1, block_of(c))
+      allowed = sub%hot(lane_of(c), problem%friction_row, block_of(c))*now(lane_of(c), 1, block_of(c))
       tangential = 0.0_dp
-      do d = 2, problem%kernels%nf
+      do d = 2, problem%nf
         tangential = tangential + now(lane_of(c), d, block_of(c))**2
       end do
       if (sqrt(tangential) < sticking*allowed) counts(2) = counts(2) + 1
@@ -181,7 +182,7 @@ contains
     type(creep_t), intent(out) :: group
     !> a grain of the same group, itself for the first one; contacts and grains of the groups, by their first grains
     integer :: first(sub%n_grains), contacts(sub%n_grains), grains(sub%n_grains)
-    real(dp) :: squares(sub%n_grains), v(problem%kernels%nv)
+    real(dp) :: squares(sub%n_grains), v(problem%nv)
     integer :: b, c, i, j
 
     do b = 1, sub%n_grains
@@ -207,7 +208,7 @@ contains
     do b = 1, sub%n_grains
       call apply_inverse_mass(sub%inverse_mass(:, b), sub%reaction(:, b), v)
       grains(first(b)) = grains(first(b)) + 1
-      squares(first(b)) = squares(first(b)) + sum(v(1:problem%kernels%nd)**2)
+      squares(first(b)) = squares(first(b)) + sum(v(1:problem%nd)**2)
     end do
     if (sub%n_grains == 0) return
     b = maxloc(contacts, 1)

@@ -10,7 +10,8 @@ module gravier_islands
   use gravier_narrow, only: narrow
   use gravier_disjoint_sets, only: join_sets, number_sets
   use gravier_body_mass, only: inverse_of_translation
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: islands_t, island_part_t, island_sums_t, find_islands
@@ -66,7 +67,7 @@ contains
     end do
     if (problem%n_subdomains > 1) call find_places(problem, islands)
     do s = 1, size(mass)
-      call add_masses(problem%sub(s), problem%kernels%nd, islands%part(s), mass(s))
+      call add_masses(problem%sub(s), problem%nd, islands%part(s), mass(s))
     end do
     call islands%complete(problem, 1, mass)
     do s = 1, size(mass)
@@ -142,7 +143,7 @@ contains
     do
       do s = 1, size(label)
         associate (part => islands%part(s), shared => problem%shared%part(s))
-          allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+          allocate (field(problem%nv, problem%sub(s)%n_columns), source=0.0_dp)
           do j = 1, shared%n_shared
             field(1, shared%body(j)) = label(s)%of_island(part%of_body(shared%body(j)))
           end do

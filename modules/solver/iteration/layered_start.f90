@@ -18,9 +18,10 @@
 module gravier_layered_start
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_sweep
-  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: add_inverse_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_acceleration, only: acceleration_t
   use gravier_method, only: work_t
   use gravier_sweep_order, only: group_contacts
@@ -239,7 +240,7 @@ contains
         this%taken(k) = found(order(k))
       end do
       call pack_contacts(sub, this)
-      if (size(found) > 0) call set_operators(problem, size(found), this%pair, this%hot, this%weight)
+      if (size(found) > 0) call set_operators(problem%kernels, size(found), this%pair, this%hot, this%weight)
     end associate
   end subroutine take_layer
 
@@ -362,8 +363,8 @@ contains
   end subroutine pack_contacts
 
   !> Local operators of n > 0 contacts with the weights of what moves.
-  subroutine set_operators(problem, n, pair, hot, weight)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine set_operators(kernels, n, pair, hot, weight)
+    type(kernels_t), intent(in) :: kernels
     integer, intent(in) :: n
     integer, intent(in), contiguous :: pair(:, :)
     real(dp), intent(inout), contiguous :: hot(:, :, :)
@@ -371,7 +372,7 @@ contains
     real(dp) :: whole(3)
 
     whole(:) = 1.0_dp
-    call problem%kernels%set_operators(pair, hot, weight, whole)
+    call kernels%set_operators(pair, hot, weight, whole)
     hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
   end subroutine set_operators
 

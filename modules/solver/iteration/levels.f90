@@ -12,7 +12,8 @@ module gravier_levels
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_supports, only: supports_t, find_supports
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   implicit none
@@ -98,7 +99,7 @@ contains
           do b = sub%n_grains + 1, sub%n_columns
             if (length(b) < unreached) cycle
             if (round == 1 .and. .not. supports(s)%column(b)) cycle
-            if (round == 2 .and. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) cycle
+            if (round == 2 .and. any(sub%inverse_mass(1:problem%nd, b) > 0.0_dp)) cycle
             length(b) = 0.0_dp
             starts = .true.
           end do
@@ -213,7 +214,7 @@ contains
     do s = 1, size(self%part)
       associate (n => problem%sub(s)%n_columns)
         if (.not. allocated(self%part(s)%contact)) call order_contacts(problem%sub(s), self%part(s), self%most_depth)
-        allocate (sums(s)%own(problem%kernels%nv, n), source=0.0_dp)
+        allocate (sums(s)%own(problem%nv, n), source=0.0_dp)
         allocate (sums(s)%sinks(n), source=0.0_dp)
       end associate
       if (problem%n_subdomains == 1) cycle
@@ -249,7 +250,7 @@ contains
           if (self%part(s)%depth(b) == afloat) cycle
           sinking = abs(sums(s)%sinks(b))
           fastest(1) = max(fastest(1), sinking)
-          if (sinking > fastest(2)) fastest(2) = max(fastest(2), min(sinking, norm2(sub%v_global(1:problem%kernels%nd, b))))
+          if (sinking > fastest(2)) fastest(2) = max(fastest(2), min(sinking, norm2(sub%v_global(1:problem%nd, b))))
           parts(1, s) = parts(1, s) + sinking**2/sub%multiplicity(b)
           parts(2, s) = parts(2, s) + 1.0_dp/sub%multiplicity(b)
         end do

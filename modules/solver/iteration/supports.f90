@@ -32,7 +32,7 @@ contains
     do s = 1, size(supports)
       allocate (supports(s)%column(problem%sub(s)%n_columns), source=.false.)
     end do
-    load = norm2(problem%load(1:problem%kernels%nd))
+    load = norm2(problem%load(1:problem%nd))
     if (.not. load > 0.0_dp) return
     do s = 1, size(supports)
       if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
@@ -45,7 +45,7 @@ contains
         do g = 1, size(sub%hot, 3)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             if (maxval(sub%pair(:, (g - 1)*lanes + q)) <= sub%n_bodies) cycle
-            pressing = dot_product(sub%hot(q, 1:problem%kernels%nd, g), problem%load(1:problem%kernels%nd))
+            pressing = dot_product(sub%hot(q, 1:problem%nd, g), problem%load(1:problem%nd))
             call add_pressing(sub%pair(1, (g - 1)*lanes + q), pressing)
             call add_pressing(sub%pair(2, (g - 1)*lanes + q), -pressing)
           end do

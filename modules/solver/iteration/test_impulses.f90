@@ -17,7 +17,8 @@ module gravier_test_impulses
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes, lane_of, block_of
   use gravier_body_mass, only: inverse_products, inverse_of_translation, mass_product
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
+  use gravier_contact_problem, only: contact_problem_t, n_residual_sums
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: virial_of
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
@@ -223,9 +224,9 @@ contains
         call add_contacts(self, problem, islands, s, problem%sub(s)%impulse, sums(s)%value)
       end if
       if (allocated(self%part(s)%load)) then
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), self%part(s)%load, islands%part(s), sums(s)%value)
+        call add_bodies(problem%sub(s), problem%nd, self%part(s), self%part(s)%load, islands%part(s), sums(s)%value)
       else
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), problem%sub(s)%reaction, islands%part(s), sums(s)%value)
+        call add_bodies(problem%sub(s), problem%nd, self%part(s), problem%sub(s)%reaction, islands%part(s), sums(s)%value)
       end if
     end do
     call islands%complete(problem, n_island_sums, sums)
@@ -271,7 +272,7 @@ contains
       real(dp) :: powers(lanes, n_tests + 1, together)
       integer :: from, to, c, i, q, g, island(lanes*together)
 
-      associate (sub => problem%sub(s), shift => problem%kernels%row%shift)
+      associate (sub => problem%sub(s), shift => problem%row%shift)
         do from = 1, size(sub%hot, 3), together
           to = min(from + together - 1, size(sub%hot, 3))
           island(:) = 0
@@ -339,9 +340,9 @@ contains
 
     if (.not. allocated(part%local)) then
       associate (blocks => size(sub%hot, 3))
-        allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
+        allocate (part%local(problem%nv, sub%n_columns), part%recent(problem%nv, sub%n_columns))
         allocate (power(lanes, blocks))
-        allocate (part%kept(lanes, problem%kernels%nc, merge(blocks, 0, problem%cell%is_driven)))
+        allocate (part%kept(lanes, problem%nc, merge(blocks, 0, problem%cell%is_driven)))
       end associate
     end if
     part%local(:, :) = 0.0_dp
@@ -389,7 +390,7 @@ contains
           & power, part%local, part%recent, part%kept, found, largest)
         sums(1:3) = found(1:3)
         sums(at_powers + 1:at_products) = found(4:)
-        if (problem%cell%is_driven) call find_virials(sub, problem%kernels%nf, part%kept, on_bodies, previous, sums(n_sums + 1:))
+        if (problem%cell%is_driven) call find_virials(sub, problem%nf, part%kept, on_bodies, previous, sums(n_sums + 1:))
       end associate
     end subroutine test_with
 

@@ -116,7 +116,7 @@ contains
     parts(:, :) = 0.0_dp
     moves = .false.
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         do b = 1, sub%n_bodies
           heavy = inverse_of_translation(sub%inverse_mass(:, b), nd)
           if (.not. heavy > 0.0_dp) cycle
@@ -129,13 +129,13 @@ contains
         end do
         do b = sub%n_grains + 1, sub%n_columns
           ! boundaries that forces move along some axes move as prescribed along the others
-          do d = 1, problem%kernels%nv
+          do d = 1, problem%nv
             moves = moves .or. (abs(sub%v_free(d, b)) > 0.0_dp .and. .not. sub%moves(d, b))
           end do
         end do
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
-        if (problem%kernels%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
-          & any(abs(sub%hot(:, problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1, :)) > 0.0_dp)
+        if (problem%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
+          & any(abs(sub%hot(:, problem%shift_row + 1:problem%shift_row + nd - 1, :)) > 0.0_dp)
       end associate
     end do
     call problem%comm%sum_parts(parts, sums)
@@ -182,7 +182,7 @@ contains
 
     fastest = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         do b = 1, sub%n_bodies
           rim = 0.0_dp
           if (b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_global(nd + 1:, b))

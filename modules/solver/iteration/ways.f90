@@ -6,7 +6,8 @@
 module gravier_ways
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: ways_t, list_closed, shorten_ways, unreached
@@ -53,7 +54,7 @@ contains
         allocate (ways(s)%open(sub%n_columns), ways(s)%waits(sub%n_columns), source=.false.)
         allocate (pair(2, sub%n_contacts), step(sub%n_contacts))
         n = 0
-        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, n, pair, step, unit)
+        if (sub%n_contacts > 0) call take_closed(sub, problem%nd + 1, closed, n, pair, step, unit)
         ways(s)%n_closed = n
         call list_by_body(pair(:, 1:n), step(1:n), ways(s))
         deallocate (pair, step)
@@ -151,7 +152,7 @@ contains
     if (.not. problem%comm%any_true(shares)) return
     do
       do s = 1, size(ways)
-        allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+        allocate (field(problem%nv, problem%sub(s)%n_columns), source=0.0_dp)
         field(1, :) = ways(s)%length
         call problem%shared%load(s, field)
         deallocate (field)

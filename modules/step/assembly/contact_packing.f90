@@ -6,7 +6,7 @@ module gravier_contact_packing
   use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius, contact_tangents
   use gravier_sweep_order, only: group_contacts
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: image_velocity
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, add_travel
@@ -334,10 +334,10 @@ contains
 
     nd = kernels%nd
     allocate (v, mold=sub%impulse)
-    call kernels%contact_velocity(sub%pair, sub%hot, start, v)
+    call sub%contact_velocity(kernels, start, v)
     if (physics%laws%returns) then
       allocate (free, mold=v)
-      call kernels%contact_velocity(sub%pair, sub%hot, sub%v_free, free)
+      call sub%contact_velocity(kernels, sub%v_free, free)
     end if
     before = -1
     do c = 1, found%n

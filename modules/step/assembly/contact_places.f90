@@ -2,7 +2,7 @@
 module gravier_contact_places
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_halo, only: local_bodies_t
   implicit none
   private
@@ -24,7 +24,7 @@ contains
 
     i = view%list%candidate(sub%source(c))
     j = view%list%antagonist(sub%source(c))
-    if (kernels%row%arm_i > 0) then
+    if (kernels%has_shapes()) then
       call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
       place(:) = view%bodies%position(:, i) + arm_i
       if (view%bodies%glued(i) > 0 .and. j > 0) place(:) = view%bodies%position(:, max(j, 1)) + arm_j

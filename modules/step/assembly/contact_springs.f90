@@ -7,7 +7,8 @@ module gravier_contact_springs
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
   use gravier_contact_operator, only: find_local_operator
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: subtract_images
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: halo_t
@@ -173,12 +174,12 @@ contains
     logical :: slides
     integer :: k, c, d, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     do k = 1, size(problem%sub)
       associate (sub => problem%sub(k), list => halo%view(k)%list)
         allocate (v, mold=sub%impulse)
         call list%forget_elongations()
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+        call sub%contact_velocity(problem%kernels, sub%v_global, v)
         if (problem%cell%moves) call subtract_images(problem, k, v)
         do c = 1, sub%n_contacts
           associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
@@ -246,13 +247,13 @@ contains
     type(physics_t), intent(in) :: physics
     !> (along the normals and along the tangents; at the start and at the end) [J]
     real(dp), intent(out) :: energies(2, 2)
-    real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
+    real(dp) :: v(lanes, problem%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
     logical :: slides
     integer :: c, d
 
     energies(:, :) = 0.0_dp
-    associate (sub => problem%sub(k), nd => problem%kernels%nd, h => physics%h, theta => physics%theta)
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+    associate (sub => problem%sub(k), nd => problem%nd, h => physics%h, theta => physics%theta)
+      call sub%contact_velocity(problem%kernels, sub%v_global, v)
       if (problem%cell%moves) call subtract_images(problem, k, v)
       do c = 1, sub%n_contacts
         if (.not. sub%yields(c)) cycle

@@ -156,7 +156,7 @@ contains
     pair%uncertain = uncertain
     pair%in_motion = in_motion
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%nf)
         if (laws%breaks) call find_slips(problem, s, v)
         do c = 1, sub%n_contacts
           p = sub%source(c)
@@ -193,7 +193,7 @@ contains
     ! whatever moves is in doubt
     pair%uncertain = huge(1.0_dp)
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%nf)
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)
@@ -220,13 +220,13 @@ contains
     real(dp), allocatable, intent(out) :: v(:, :, :)
     integer :: last
 
-    associate (sub => problem%sub(s), row => problem%kernels%row)
+    associate (sub => problem%sub(s), row => problem%row)
       allocate (v, mold=sub%impulse)
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
+      call sub%contact_velocity(problem%kernels, sub%v_global, v)
       if (problem%cell%moves) call subtract_images(problem, s, v)
       v(:, 1, :) = v(:, 1, :) + sub%hot(:, row%shift, :)
       if (row%shift_t == 0) return
-      last = problem%kernels%nf - 2
+      last = problem%nf - 2
       v(:, 2:2 + last, :) = v(:, 2:2 + last, :) + sub%hot(:, row%shift_t:row%shift_t + last, :)
     end associate
   end subroutine find_slips

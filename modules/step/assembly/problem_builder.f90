@@ -6,7 +6,8 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_physics, only: physics_t
@@ -34,7 +35,7 @@ contains
     integer :: s, b
 
     problem%comm => decomposition%comm
-    problem%kernels = kernels
+    call problem%take_kernels(kernels)
     problem%n_subdomains = decomposition%n_subdomains
     problem%cell = physics%cell
     if (allocated(problem%sub)) deallocate (problem%sub)
@@ -225,17 +226,17 @@ contains
   !> that it gives where nothing moves. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(3), moving(problem%kernels%nd), rim, speed, lightest, inverse
+    real(dp) :: scales(3), moving(problem%nd), rim, speed, lightest, inverse
     integer :: s, b, c, d, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     scales(:) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         lightest = huge(1.0_dp)
         do b = 1, sub%n_bodies
           rim = 0.0_dp
-          if (problem%kernels%row%arm_i > 0 .and. b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
+          if (problem%has_shapes() .and. b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
           scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)) + rim)
           moving(:) = sub%v_free(1:nd, b)
           do d = 1, nd
@@ -253,7 +254,7 @@ contains
         end do
         do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring))
           if (.not. sub%yields(c)) cycle
-          associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%kernels%row)
+          associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%row)
             scales(1) = max(scales(1), -contact(row%shift)/contact(row%compliance_n))
           end associate
         end do

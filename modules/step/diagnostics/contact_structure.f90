@@ -3,7 +3,8 @@ module gravier_contact_structure
   use gravier_kinds, only: dp, i4, i8
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_halo, only: halo_t
   use gravier_decomposition, only: decomposition_t
@@ -113,11 +114,11 @@ contains
     integer(i8), intent(in) :: n_free
     !> [s]
     real(dp), intent(in) :: h
-    real(dp) :: parts(problem%kernels%nd**2 + 2, size(problem%sub)), sums(problem%kernels%nd**2 + 2), largest
+    real(dp) :: parts(problem%nd**2 + 2, size(problem%sub)), sums(problem%nd**2 + 2), largest
     integer(i8) :: counts(n_counts)
     integer :: s, c, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     parts(:, :) = 0.0_dp
     counts(:) = 0
     largest = 0.0_dp
@@ -218,7 +219,7 @@ contains
     integer :: s, b, k, n, neighbours
 
     do s = 1, size(problem%sub)
-      allocate (tally(s)%ends(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+      allocate (tally(s)%ends(problem%nv, problem%sub(s)%n_columns), source=0.0_dp)
       call tally_contacts(problem%sub(s), halo%view(s)%list, tally(s))
       call problem%shared%load(s, tally(s)%ends)
     end do

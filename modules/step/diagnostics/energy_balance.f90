@@ -6,7 +6,8 @@ module gravier_energy_balance
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
   use gravier_contact_kernels, only: contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: image_velocity
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
@@ -50,9 +51,8 @@ module gravier_energy_balance
     procedure :: set_state => energy_set_state
   end type energy_balance_t
 
-  !> words of the state of a balance
+  !> words of the state of a balance, and what they are, in their order: the version of checkpoints, which changes with them
   integer, parameter :: energy_words = 15
-  !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: energy_record = "translation rotation boundaries potential start load_work boundary_work "// &
     & "dissipated_normal dissipated_friction carried_away elastic elastic_start dissipated_rolling dissipated_pivoting"
   !> places among the sums of a step
@@ -252,7 +252,7 @@ contains
       allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
       call find_start(step, earlier, s, mean)
       mean(:, :) = 0.5_dp*(mean + sub%v_global)
-      call kernels%contact_velocity(sub%pair, sub%hot, mean, v)
+      call sub%contact_velocity(kernels, mean, v)
       do c = 1, sub%n_contacts
         q = lane_of(c)
         g = block_of(c)
@@ -274,13 +274,13 @@ contains
     !> The image that a contact meets moves with the cell, as a boundary does.
     subroutine add_cell_work(c)
       integer, intent(in) :: c
-      real(dp) :: image(step%problem%kernels%nd), mean_gradient(3, 3)
+      real(dp) :: image(step%problem%nd), mean_gradient(3, 3)
       integer :: nf
 
       associate (sub => step%problem%sub(s), cell => step%problem%cell)
-        nf = step%problem%kernels%nf
+        nf = step%problem%nf
         mean_gradient(:, :) = 0.5_dp*(cell%before + cell%now)
-        image(:) = image_velocity(sub, step%problem%kernels%nd, c, mean_gradient)
+        image(:) = image_velocity(sub, step%problem%nd, c, mean_gradient)
         v(q, 1:nf, g) = v(q, 1:nf, g) - image(1:nf)
         part(in_boundary) = part(in_boundary) + sub%normal_impulse(c)*image(1) + sum(sub%impulse(q, 2:nf, g)*image(2:nf))
       end associate
@@ -288,7 +288,7 @@ contains
 
     subroutine add_boundary_work(c)
       integer, intent(in) :: c
-      real(dp) :: p(step%problem%kernels%nd), m(step%problem%kernels%nv - step%problem%kernels%nd)
+      real(dp) :: p(step%problem%nd), m(step%problem%nv - step%problem%nd)
       integer :: column, d
 
       associate (problem => step%problem, sub => step%problem%sub(s))
@@ -301,10 +301,10 @@ contains
         do d = 1, size(p)
           if (.not. earlier(sub%boundary(column))%free(d)) part(in_boundary) = part(in_boundary) + p(d)*mean(d, column)
         end do
-        if (problem%kernels%rolling_row == 0) return
+        if (.not. problem%has_rolling()) return
         call global_moment(problem%kernels, sub%hot, sub%impulse, c, m)
         if (sub%pair(1, c) > sub%n_grains) m(:) = -m
-        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%kernels%nd + 1:, column))
+        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%nd + 1:, column))
       end associate
     end subroutine add_boundary_work
 
@@ -320,7 +320,7 @@ contains
     real(dp), intent(out), contiguous :: start(:, :)
     integer :: c, i, j, nd
 
-    nd = step%problem%kernels%nd
+    nd = step%problem%nd
     start(:, :) = 0.0_dp
     associate (sub => step%problem%sub(s), list => step%halo%view(s)%list)
       do c = 1, sub%n_contacts
@@ -370,7 +370,7 @@ contains
       i = list%candidate(sub%source(c))
       j = list%antagonist(sub%source(c))
       normal(:) = sub%hot(lane_of(c), 1:size(point), block_of(c))
-      if (step%problem%kernels%row%arm_i > 0) then
+      if (step%problem%has_shapes()) then
         call contact_arms(step%problem%kernels, sub%hot, c, arm_i, arm_j)
         if (k == i) then
           point(:) = bodies%position(:, j) + arm_j

@@ -7,7 +7,7 @@ module gravier_grain_balance
   use gravier_periodic, only: gradient_times
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_moving_cell, only: cell_motion_t
   use gravier_halo, only: local_bodies_t
@@ -91,7 +91,7 @@ contains
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
       call add_grains(step%decomposition%figures, step%decomposition%owned(s), step%physics, parts(:, s))
-      call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
+      call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%nv, parts(in_contacts, s))
       if (step%problem%cell%moves) parts(in_contacts, s) = parts(in_contacts, s) + work_of_carrying(step%halo%view(s), &
         & step%decomposition, s, step%physics%cell)
     end do

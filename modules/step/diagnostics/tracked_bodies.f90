@@ -107,14 +107,14 @@ contains
     integer, intent(in) :: s, c, side
     !> without friction contacts turn no body: its last entries are left [N s, N m s]
     real(dp), intent(inout) :: impulse(:)
-    real(dp) :: jacobian(problem%kernels%nc, problem%kernels%nv, 2), r(problem%kernels%nc)
+    real(dp) :: jacobian(problem%nc, problem%nv, 2), r(problem%nc)
     integer :: d
 
     associate (sub => problem%sub(s))
       call contact_jacobian(problem%kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
       r(:) = sub%impulse(lane_of(c), :, block_of(c))
       r(1) = sub%normal_impulse(c)
-      do d = 1, min(problem%kernels%nv, size(impulse))
+      do d = 1, min(problem%nv, size(impulse))
         impulse(d) = impulse(d) + sum(jacobian(:, d, side)*r)
       end do
     end associate

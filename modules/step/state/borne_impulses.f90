@@ -7,7 +7,8 @@ module gravier_borne_impulses
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
@@ -77,21 +78,21 @@ contains
             destination(n) = decomposition%comm%rank_of(view%owner(seen(b)), decomposition%n_subdomains)
             records(1, n) = view%owner(seen(b))
             records(2, n) = view%bodies%id(seen(b))
-            do d = 1, problem%kernels%nv
+            do d = 1, problem%nv
               records(2 + d, n) = transfer(part(s)%on(d, b), 0_i8)
             end do
           end do
         end associate
       end do
-      if (round == 1) allocate (records(2 + problem%kernels%nv, n), destination(n))
+      if (round == 1) allocate (records(2 + problem%nv, n), destination(n))
     end do
     call sparse_exchange(decomposition%comm, records, destination, received)
     do s = 1, size(borne)
-      allocate (borne(s)%on(problem%kernels%nv, decomposition%owned(s)%n), source=0.0_dp)
+      allocate (borne(s)%on(problem%nv, decomposition%owned(s)%n), source=0.0_dp)
     end do
     do k = 1, size(received, 2)
       call decomposition%find_owned(received(1:2, k), h, place)
-      do d = 1, problem%kernels%nv
+      do d = 1, problem%nv
         borne(h)%on(d, place) = borne(h)%on(d, place) + transfer(received(2 + d, k), 0.0_dp)
       end do
     end do
@@ -115,8 +116,8 @@ contains
         impulse(lane_of(c), :, block_of(c)) = sub%impulse(lane_of(c), :, block_of(c))
         impulse(lane_of(c), 1, block_of(c)) = sub%normal_impulse(c)
       end do
-      allocate (reaction(problem%kernels%nv, sub%n_columns), source=0.0_dp)
-      call problem%kernels%add_reaction(sub%pair, sub%hot, impulse, reaction)
+      allocate (reaction(problem%nv, sub%n_columns), source=0.0_dp)
+      call sub%add_reaction(problem%kernels, impulse, reaction)
     end associate
   end subroutine sum_impulses
 
@@ -179,7 +180,7 @@ contains
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
           if (.not. owned%sleeps(k) .or. .not. any(abs(borne(s)%on(:, k)) > 0.0_dp)) cycle
-          owned%held(1:problem%kernels%nv, k) = owned%held(1:problem%kernels%nv, k) + (2*mark - 1)*borne(s)%on(:, k)
+          owned%held(1:problem%nv, k) = owned%held(1:problem%nv, k) + (2*mark - 1)*borne(s)%on(:, k)
           owned%steady(k) = .false.
         end do
       end associate

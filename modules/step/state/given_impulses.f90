@@ -15,7 +15,8 @@ module gravier_given_impulses
   use gravier_given_contacts, only: given_contacts_t, find_ranks
   use gravier_boundary, only: boundary_t
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
@@ -233,7 +234,7 @@ contains
       pressing(k) = abs(sum(numbers(1:3)*numbers(4:6)))
       if (problem%sub(s)%yields(c)) then
         if (numbers(13) < not_given) then
-          associate (nd => problem%kernels%nd)
+          associate (nd => problem%nd)
             call put_elongation(halo%view(s)%list, problem%sub(s), c, numbers(1:nd), numbers(13:12 + nd))
           end associate
         else
@@ -283,10 +284,10 @@ contains
     !> of a record
     real(dp), intent(in) :: numbers(n_numbers)
     integer, intent(out) :: nearest
-    real(dp) :: place(problem%kernels%nd), way(problem%kernels%nd), least
+    real(dp) :: place(problem%nd), way(problem%nd), least
     integer :: k, c, s, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     nearest = 0
     least = huge(least)
     do k = first, size(pairs, 2)
@@ -321,7 +322,7 @@ contains
     given(:) = numbers(4:6)
     pressing = sum(given*normal)
     radius = 1.0_dp
-    if (kernels%row%rolling_radius > 0) radius = sub%hot(lane_of(c), kernels%row%rolling_radius, block_of(c))
+    if (kernels%has_rolling()) radius = sub%hot(lane_of(c), kernels%row%rolling_radius, block_of(c))
     associate (impulse => list%impulse(:, sub%source(c)))
       impulse(1) = impulse(1) + pressing
       select case (kernels%nf)

@@ -48,19 +48,19 @@ contains
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    rolls = problem%kernels%rolling_row > 0
+    rolls = problem%has_rolling()
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), list => halo%view(s)%list)
         call list%forget_impulses()
         do g = 1, n_blocks(sub%n_contacts)
-          if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
-          if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
+          if (problem%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
           do q = 1, lanes
             ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart; contacts of
             ! no effect have none
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
-            if (problem%kernels%nf < 3) then
+            if (problem%nf < 3) then
               list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
@@ -82,7 +82,7 @@ contains
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    rolls = problem%kernels%rolling_row > 0
+    rolls = problem%has_rolling()
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
@@ -91,16 +91,16 @@ contains
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
             associate (kept => list%impulse(:, sub%source(c)))
-              if (problem%kernels%nf == 3) vector(q, :) = kept(2:4)
-              if (problem%kernels%nf == 3 .and. rolls) moment(q, :) = kept(5:7)
+              if (problem%nf == 3) vector(q, :) = kept(2:4)
+              if (problem%nf == 3 .and. rolls) moment(q, :) = kept(5:7)
               if (.not. kept(1) > 0.0_dp) cycle
               sub%impulse(q, 1, g) = kept(1)
-              if (problem%kernels%nf < 3) sub%impulse(q, 2:, g) = kept(2:)
+              if (problem%nf < 3) sub%impulse(q, 2:, g) = kept(2:)
             end associate
           end do
           ! contacts of no effect have no normal, and no frame
-          if (problem%kernels%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
-          if (problem%kernels%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
+          if (problem%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
           sub%impulse(q:, :, g) = 0.0_dp
         end do
       end associate

@@ -21,7 +21,8 @@ module gravier_sleeping
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation, multiply_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
@@ -87,7 +88,7 @@ contains
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call sum_impulses(decomposition%boundaries, halo%view(s)%list, problem%sub(s), problem%kernels%nv, rest(s)%sums)
+      call sum_impulses(decomposition%boundaries, halo%view(s)%list, problem%sub(s), problem%nv, rest(s)%sums)
       call problem%shared%load(s, rest(s)%sums)
     end do
     call problem%shared%pass()
@@ -102,7 +103,7 @@ contains
         call problem%shared%sum_copies(s, own%restless, mean=.false.)
         call find_seen(view%list, sub, own%seen)
         allocate (own%steps(sub%n_grains), source=0)
-        allocate (own%left(problem%kernels%nv, sub%n_grains))
+        allocate (own%left(problem%nv, sub%n_grains))
         own%left(:, :) = sub%v_global(:, 1:sub%n_grains)
         do b = 1, sub%n_grains
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
@@ -180,7 +181,7 @@ contains
       do b = 1, sub%n_columns
         if (b <= sub%n_grains) then
           rest%rests(b) = rest%sums(2, b) <= settled*rest%sums(1, b) .and. &
-            & is_slow(sub, problem%kernels%nd, &
+            & is_slow(sub, problem%nd, &
             & 0.5_dp*waking_momentum(rule, problem, rest%sums(1, b), 1.0_dp/sub%inverse_mass(1, b)), b)
         else if (sub%boundary(b) > 0) then
           rest%rests(b) = .not. may_push(boundaries(sub%boundary(b)))
@@ -254,7 +255,7 @@ contains
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer, allocatable :: destination(:)
     logical, allocatable :: sends(:)
-    real(dp) :: left(problem%kernels%nv)
+    real(dp) :: left(problem%nv)
     integer :: s, b, k, r, h, place, n, round, d
 
     do s = 1, size(decomposition%owned)

@@ -156,7 +156,7 @@ contains
       allocate (every(s)%are(problem%sub(s)%n_contacts), source=.true.)
     end do
     call find_borne(decomposition, halo, problem, every, .false., borne)
-    call wake_moved(decomposition, physics, problem%kernels%nw, borne, woken)
+    call wake_moved(decomposition, physics, problem%nw, borne, woken)
     woken = decomposition%comm%any_true(woken)
     if (.not. woken) return
     call halo%refresh(decomposition)

@@ -4,7 +4,8 @@ module gravier_whole_problem
   use gravier_sorting, only: argsort, find_sorted
   use gravier_shared_exchange, only: shared_exchange_t
   use gravier_boundary, only: boundary_words
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_interface, only: interface_statistics_t

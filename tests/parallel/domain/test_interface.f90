@@ -69,7 +69,7 @@ contains
     do s = 1, size(problem%sub)
       matrix%part(s)%body_work(:, :) = 0.0_dp
       do b = 1, problem%sub(s)%n_bodies
-        do d = 1, problem%kernels%nv
+        do d = 1, problem%nv
           matrix%part(s)%body_work(d, b) = copy_of(problem%sub(s)%id(b), problem%sub(s)%subdomain, d, trial)
         end do
       end do
@@ -116,7 +116,7 @@ contains
         do k = 1, part%n_shared
           most = max(most, part%multiplicity(k))
           at = part%first(k) + part%copy_rank(k) - 1
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             upper = 0.0_dp
             lower = 0.0_dp
             if (part%copy_rank(k) < part%multiplicity(k)) upper = copy_of(sub%id(part%body(k)), sub%subdomain, d, 1) - &
@@ -139,7 +139,7 @@ contains
       call load_transpose(sim%problem, s, g(s), matrix)
       associate (sub => sim%problem%sub(s))
         do k = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             part(s) = part(s) + matrix%part(s)%body_work(d, k)*copy_of(sub%id(k), sub%subdomain, d, 1)
           end do
         end do
@@ -359,14 +359,14 @@ contains
     do s = 1, size(f)
       associate (part => sim%problem%shared%part(s), sub => sim%problem%sub(s))
         do k = 1, part%n_shared
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             mean = 0.0_dp
             do j = part%first(k), part%first(k + 1) - 1
               mean = mean + copy_of(sub%id(part%body(k)), part%sharer(j), d, 5)
             end do
             mean = mean/part%multiplicity(k)
             velocity = copy_of(sub%id(part%body(k)), sub%subdomain, d, 5) - &
-              & sub%weight(min(d, sim%problem%kernels%nw), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
+              & sub%weight(min(d, sim%problem%nw), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
             right = right .and. abs(velocity - mean) <= 100*epsilon(1.0_dp)
           end do
         end do

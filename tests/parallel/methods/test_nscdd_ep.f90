@@ -116,8 +116,8 @@ contains
     integer :: s, b, d, k, nd, nv
     logical :: own, balanced
 
-    nd = sim%problem%kernels%nd
-    nv = sim%problem%kernels%nv
+    nd = sim%problem%nd
+    nv = sim%problem%nv
     own = .true.
     balanced = .true.
     select type (method => sim%method)
@@ -221,7 +221,7 @@ contains
     call problem%evaluate()
     allocate (part(size(problem%sub)))
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         allocate (v, mold=sub%impulse)
         v(:, :, :) = 0.0_dp
         mean = 0.5_dp*(sub%v_global + sub%v_free)

@@ -8,7 +8,8 @@ program test_solver_parts
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_memory_need, only: check_memory
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method, only: work_t
   use gravier_nlgs, only: nlgs_t
   use gravier_convergence_history, only: convergence_history_t
@@ -160,7 +161,7 @@ contains
     do s = 1, size(ways)
       associate (sub => sim%problem%sub(s))
         sub%gap(:) = 0.5_dp
-        sub%hot(:, sim%problem%kernels%nd + 1, :) = 0.5_dp
+        sub%hot(:, sim%problem%nd + 1, :) = 0.5_dp
       end associate
     end do
     call list_closed(sim%problem, ways)
@@ -669,7 +670,7 @@ contains
       & "&solver method = 'nscdd' /", sim)
     expected = 0.0_dp
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), row => sim%problem%kernels%row)
+      associate (sub => sim%problem%sub(s), row => sim%problem%row)
         call check(row%shift_t > 0, "the law has a shift along the tangent")
         do c = 1, sub%n_contacts
           ! nothing from the floor
@@ -726,7 +727,7 @@ contains
       & ", point = "//trim(merge("-1, 0   ", "-1, 0, 0", dimension == 2))//" /"//newline//"&solver method = 'nscdd' /", sim, &
       & dimension, rolling)
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels, row => sim%problem%kernels%row)
+      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels, row => sim%problem%row)
         nf = kernels%nf
         call check_equal(parts_of(kernels%nc, kernels%nv), merge(dimension, 1, rolling), "parts that the normal impulse bounds")
         call law%init(kernels, sub)

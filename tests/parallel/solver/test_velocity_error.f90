@@ -159,7 +159,7 @@ contains
           do c = 1, sub%n_contacts
             if (min(place(sim%problem, s, sub%pair(1, c), count), place(sim%problem, s, sub%pair(2, c), count)) /= cut) cycle
             sub%gap(c) = merge(0.09_dp, 0.11_dp, k == 1)*sim%problem%error_scale*step
-            sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
+            sub%hot(lane_of(c), sim%problem%row%shift, block_of(c)) = sub%gap(c)/step
           end do
         end associate
       end do
@@ -256,7 +256,7 @@ contains
           ! the contact of both parts is open
           sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
           sub%gap(c) = 2.0_dp*gravity*step**2
-          sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
+          sub%hot(lane_of(c), sim%problem%row%shift, block_of(c)) = sub%gap(c)/step
         end do
       end associate
     end do

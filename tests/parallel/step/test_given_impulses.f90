@@ -81,7 +81,7 @@ contains
   !> Impulses by the pair, the same whatever subdomain has it; every fourth pair has none.
   subroutine give_impulses(sim)
     type(simulation_t), intent(inout) :: sim
-    real(dp) :: impulse(sim%problem%kernels%nc)
+    real(dp) :: impulse(sim%problem%nc)
     integer(i8) :: pair
     integer :: s, c, e
 

@@ -188,7 +188,7 @@ contains
     zero = .true.
     fresh = 0
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), nc => sim%problem%kernels%nc)
+      associate (sub => sim%problem%sub(s), nc => sim%problem%nc)
         do c = 1, sub%n_contacts
           i = int(sub%id(sub%pair(1, c)))
           j = int(sub%id(sub%pair(2, c)))
@@ -418,7 +418,7 @@ contains
   subroutine check_projected(problem, kept)
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(in) :: kept(:, :, :)
-    real(dp) :: t(3), u(3), expected(3), found(3), impulse(problem%kernels%nc), hot(problem%kernels%nh)
+    real(dp) :: t(3), u(3), expected(3), found(3), impulse(problem%nc), hot(problem%nh)
     integer(i8) :: turned, fresh
     integer :: s, c, i, j
     logical :: right

@@ -33,11 +33,11 @@ contains
     type(halo_t), intent(out) :: halo
     type(pair_memory_t) :: memory
 
-    call problem%kernels%choose(dimension, effects_t(friction=.true., compliance=.true.))
+    call problem%choose_kernels(dimension, effects_t(friction=.true., compliance=.true.))
     memory = memory_of(problem%kernels, .true., .false., .false., .false.)
     call check_equal(memory%n_spring, merge(1, 3, dimension == 2), "entries of an elongation")
     allocate (problem%sub(1), halo%view(1))
-    associate (sub => problem%sub(1), kernels => problem%kernels, row => problem%kernels%row, list => halo%view(1)%list)
+    associate (sub => problem%sub(1), kernels => problem%kernels, row => problem%row, list => halo%view(1)%list)
       call list%init(.false., 1)
       call list%add(1, -1, 0)
       call list%finish([1], memory)
@@ -79,7 +79,7 @@ contains
     expected%velocity(1:dimension) = velocity
     ! 1/W_nn is the mass; nothing turns
     call expected%damp(1.0_dp/mass, h, gap)
-    associate (sub => problem%sub(1), row => problem%kernels%row, list => halo%view(1)%list)
+    associate (sub => problem%sub(1), row => problem%row, list => halo%view(1)%list)
       call pack_spring(list, spring_t(), problem%kernels, physics, 1, velocity, sub)
       call check(.not. sub%yields(1), "a rigid contact")
       call check_close(sub%overlap(yielding=.false.), -gap, 0.0_dp, "overlap of a rigid contact")
