@@ -243,7 +243,7 @@ contains
         counts(1) = counts(1) + sub%n_contacts
         counts(2) = counts(2) + view%list%n
         counts(3) = counts(3) + sub%n_columns
-        counts(4) = counts(4) + view%bodies%n
+        counts(4) = counts(4) + view%n_bodies()
         counts(5) = counts(5) + simulation%decomposition%owned(s)%n
       end associate
     end do

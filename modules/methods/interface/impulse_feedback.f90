@@ -73,8 +73,8 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      call load_transpose(problem, s, multipliers(s), matrix)
-      call matrix%solve(problem, s, matrix%part(s)%body_work, error)
+      call load_transpose(problem%shared, s, multipliers(s), matrix)
+      call matrix%solve(problem%sub(s), s, matrix%part(s)%body_work, error)
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
         part%lead(:, :) = sub%velocity + part%lead - matrix%part(s)%body_work
         call sub%contact_velocity(problem%kernels, part%lead, work)
@@ -111,7 +111,7 @@ contains
     if (sums(1) < 0.0_dp) self%share = min(1.0_dp, -sums(1)/max(sums(2), -sums(1)))
     do s = 1, size(problem%sub)
       associate (part => self%part(s), sub => problem%sub(s))
-        sub%impulse(:, :, :) = sub%impulse + self%share*part%step
+        call sub%add_impulses(self%share, part%step)
         sub%velocity(:, :) = sub%velocity + self%share*part%lead
       end associate
     end do

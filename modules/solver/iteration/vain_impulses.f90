@@ -166,8 +166,8 @@ contains
     integer :: b, c, nd
 
     nd = problem%nd
-    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring) .or. problem%cell%moves)
-      if (.not. (sub%yields(c) .or. problem%cell%moves)) cycle
+    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring) .or. problem%cell_moves())
+      if (.not. (sub%yields(c) .or. problem%cell_moves())) cycle
       fastest = max(fastest, abs(sub%hot(lane_of(c), problem%row%shift, block_of(c))))
     end do
     do b = 1, sub%n_columns

@@ -298,7 +298,7 @@ contains
       if (self%is_restless) limit = speed_at_rest
     end if
     ! the motion of a cell that stresses drive joins all bodies
-    if ((self%is_restless .or. self%bound_by_rest > self%most_at_rest) .and. .not. problem%cell%is_driven) then
+    if ((self%is_restless .or. self%bound_by_rest > self%most_at_rest) .and. .not. problem%cell_is_driven()) then
       self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations, self%mass)
       if (self%criterion() > self%allowed) return
     end if

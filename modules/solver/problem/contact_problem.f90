@@ -65,6 +65,8 @@ module gravier_contact_problem
   contains
     procedure :: choose_kernels => contact_problem_choose_kernels
     procedure :: take_kernels => contact_problem_take_kernels
+    procedure :: cell_moves => contact_problem_cell_moves
+    procedure :: cell_is_driven => contact_problem_cell_is_driven
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
     procedure :: take_residual => contact_problem_take_residual
@@ -100,6 +102,18 @@ contains
     self%kernels = kernels
     self%packed_layout_t = kernels%packed_layout_t
   end subroutine contact_problem_take_kernels
+
+  !> Whether the periodic cell moves in this step.
+  pure logical function contact_problem_cell_moves(self) result(moves)
+    class(contact_problem_t), intent(in) :: self
+    moves = self%cell%moves
+  end function contact_problem_cell_moves
+
+  !> Whether stresses drive the cell, so that its motion is found along with the impulses.
+  pure logical function contact_problem_cell_is_driven(self) result(is_driven)
+    class(contact_problem_t), intent(in) :: self
+    is_driven = self%cell%is_driven
+  end function contact_problem_cell_is_driven
 
   !> Impulse r of contact `c` of subdomain `s` of this rank on its candidate, in global axes [N s].
   pure subroutine contact_problem_impulse_on_candidate(self, s, c, p)

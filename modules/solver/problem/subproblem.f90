@@ -4,7 +4,7 @@ module gravier_subproblem
   use gravier_body_mass, only: apply_inverse_mass, can_move, mass_product, multiply_mass
   use gravier_contact_spring, only: spring_step_t
   use gravier_moving_cell, only: cell_contacts_t
-  use gravier_contact_kernels, only: kernels_t, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lane_of, block_of, project_on_cones
   implicit none
   private
   public :: subproblem_t
@@ -87,9 +87,15 @@ module gravier_subproblem
   contains
     procedure :: share_masses => subproblem_share_masses
     procedure :: update_local_operator => subproblem_update_local_operator
+    procedure :: start_without_impulses => subproblem_start_without_impulses
+    procedure :: start_sweeps => subproblem_start_sweeps
+    procedure :: take_impulses_off => subproblem_take_impulses_off
+    procedure :: add_impulses => subproblem_add_impulses
+    procedure :: project_impulses => subproblem_project_impulses
     procedure :: contact_velocity => subproblem_contact_velocity
     procedure :: add_reaction => subproblem_add_reaction
     procedure :: react_to => subproblem_react_to
+    procedure :: reorder_grains => subproblem_reorder_grains
     procedure :: moves => subproblem_moves
     procedure :: multiply_mass => subproblem_multiply_mass
     procedure :: product_of => subproblem_product_of
@@ -135,6 +141,49 @@ contains
     self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
   end subroutine subproblem_update_local_operator
 
+  !> Reactions and velocities of a solve that starts without impulses.
+  subroutine subproblem_start_without_impulses(self)
+    class(subproblem_t), intent(inout) :: self
+    self%reaction(:, :) = 0.0_dp
+    self%v_global(:, :) = self%v_free
+  end subroutine subproblem_start_without_impulses
+
+  !> Masses as a method wants them, and velocities those of the undivided bodies, from which its sweeps start.
+  subroutine subproblem_start_sweeps(self, kernels, shared_masses)
+    class(subproblem_t), intent(inout) :: self
+    type(kernels_t), intent(in) :: kernels
+    !> see `share_masses`
+    logical, intent(in) :: shared_masses
+
+    call self%share_masses(kernels, shared_masses)
+    self%velocity(:, :) = self%v_global
+  end subroutine subproblem_start_sweeps
+
+  !> Leave of the impulses what they have changed by since others.
+  subroutine subproblem_take_impulses_off(self, others)
+    class(subproblem_t), intent(inout) :: self
+    !> (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: others(:, :, :)
+    self%impulse(:, :, :) = self%impulse - others
+  end subroutine subproblem_take_impulses_off
+
+  !> Go from the impulses along a step.
+  subroutine subproblem_add_impulses(self, length, step)
+    class(subproblem_t), intent(inout) :: self
+    !> part of the step
+    real(dp), intent(in) :: length
+    !> (lanes, nc, blocks) [N s]
+    real(dp), intent(in), contiguous :: step(:, :, :)
+    self%impulse(:, :, :) = self%impulse + length*step
+  end subroutine subproblem_add_impulses
+
+  !> Bring the impulses into the cones of the laws.
+  subroutine subproblem_project_impulses(self, kernels)
+    class(subproblem_t), intent(inout) :: self
+    type(kernels_t), intent(in) :: kernels
+    call project_on_cones(kernels, self%n_contacts, self%hot, self%impulse)
+  end subroutine subproblem_project_impulses
+
   !> v = H^T V of velocities of the bodies, for all contacts.
   pure subroutine subproblem_contact_velocity(self, kernels, velocity, v)
     class(subproblem_t), intent(in) :: self
@@ -169,6 +218,49 @@ contains
     self%reaction(:, :) = 0.0_dp
     call kernels%add_reaction(self%pair, self%hot, impulse, self%reaction)
   end subroutine subproblem_react_to
+
+  !> Bring what is known of the grains into another order; columns of boundaries stay.
+  subroutine subproblem_reorder_grains(self, grain)
+    class(subproblem_t), intent(inout) :: self
+    !> number so far of each grain
+    integer, intent(in), contiguous :: grain(:)
+    type(subproblem_t) :: old
+    integer :: n, b
+
+    call move_alloc(self%id, old%id)
+    call move_alloc(self%owner, old%owner)
+    call move_alloc(self%place, old%place)
+    call move_alloc(self%multiplicity, old%multiplicity)
+    call move_alloc(self%radius, old%radius)
+    call move_alloc(self%volume, old%volume)
+    call move_alloc(self%applied, old%applied)
+    call move_alloc(self%v_free, old%v_free)
+    call move_alloc(self%inverse_mass, old%inverse_mass)
+    call move_alloc(self%cell%place, old%cell%place)
+    allocate (self%id, source=old%id)
+    allocate (self%owner, source=old%owner)
+    allocate (self%place, mold=old%place)
+    allocate (self%multiplicity, source=old%multiplicity)
+    allocate (self%radius, mold=old%radius)
+    if (allocated(old%volume)) allocate (self%volume, mold=old%volume)
+    if (allocated(old%applied)) allocate (self%applied, mold=old%applied)
+    allocate (self%v_free, source=old%v_free)
+    allocate (self%inverse_mass, source=old%inverse_mass)
+    if (allocated(old%cell%place)) allocate (self%cell%place, mold=old%cell%place)
+    do n = 1, self%n_grains
+      b = grain(n)
+      self%id(n) = old%id(b)
+      self%owner(n) = old%owner(b)
+      self%place(n) = old%place(b)
+      self%multiplicity(n) = old%multiplicity(b)
+      self%radius(n) = old%radius(b)
+      if (allocated(old%volume)) self%volume(n) = old%volume(b)
+      if (allocated(old%applied)) self%applied(:, n) = old%applied(:, b)
+      self%v_free(:, n) = old%v_free(:, b)
+      self%inverse_mass(:, n) = old%inverse_mass(:, b)
+      if (allocated(old%cell%place)) self%cell%place(:, n) = old%cell%place(:, b)
+    end do
+  end subroutine subproblem_reorder_grains
 
   !> Whether degree of freedom `d` of body `b` can move.
   pure logical function subproblem_moves(self, d, b) result(moves)

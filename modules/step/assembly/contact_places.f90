@@ -22,8 +22,7 @@ contains
     real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd)
     integer :: i, j
 
-    i = view%list%candidate(sub%source(c))
-    j = view%list%antagonist(sub%source(c))
+    call view%find_ends(sub%source(c), i, j)
     if (kernels%has_shapes()) then
       call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
       place(:) = view%bodies%position(:, i) + arm_i

@@ -53,7 +53,7 @@ contains
     end do
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
-    call count_figures(decomposition, halo, problem, figures)
+    call count_figures(decomposition, halo%view, problem, figures)
     problem%attracts = physics%laws%attracts
     problem%carries = .false.
     do b = 1, merge(size(decomposition%boundaries), 0, physics%laws%breaks)
@@ -79,7 +79,7 @@ contains
     integer :: c, p, b, n, n_asleep
 
     associate (list => view%list, boundaries => decomposition%boundaries)
-      allocate (numbers%of_grain(view%bodies%n), numbers%of_boundary(size(boundaries)), source=0)
+      allocate (numbers%of_grain(view%n_bodies()), numbers%of_boundary(size(boundaries)), source=0)
       n = 0
       n_asleep = 0
       sub%n_grains = 0
@@ -115,7 +115,10 @@ contains
       if (any(abs(physics%body_force) > 0.0_dp)) allocate (sub%volume(sub%n_grains))
       if (decomposition%na > 0) allocate (sub%applied(decomposition%na, sub%n_grains))
       call pack_grains(view, numbers%of_grain, decomposition%figures, kernels, physics, sub)
-      if (physics%cell%moves) call pack_places(view, numbers%of_grain, sub)
+      if (physics%cell%moves) then
+        call sub%cell%init(kernels%nd, found%n, sub%n_grains)
+        call pack_places(view, numbers%of_grain, sub%cell%place)
+      end if
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. boundaries(b)%drive%turns()) cycle
         call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
@@ -184,17 +187,17 @@ contains
   end subroutine pack_grains
 
   !> Places of the grains in a cell that moves.
-  pure subroutine pack_places(view, number_of, sub)
+  pure subroutine pack_places(view, number_of, place)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in), contiguous :: number_of(:)
-    type(subproblem_t), intent(inout) :: sub
+    !> (nd, grains) [m]
+    real(dp), intent(inout), contiguous :: place(:, :)
     real(dp) :: centre(3)
     integer :: k
 
-    allocate (sub%cell%place(size(view%bodies%position, 1), sub%n_grains))
     centre(:) = view%period%centre()
     do k = 1, size(number_of)
-      if (number_of(k) > 0) sub%cell%place(:, number_of(k)) = view%bodies%position(:, k) - centre(1:size(sub%cell%place, 1))
+      if (number_of(k) > 0) place(:, number_of(k)) = view%bodies%position(:, k) - centre(1:size(place, 1))
     end do
   end subroutine pack_places
 
@@ -258,7 +261,7 @@ contains
             scales(1) = max(scales(1), -contact(row%shift)/contact(row%compliance_n))
           end associate
         end do
-        do c = 1, merge(sub%n_contacts, 0, problem%cell%moves)
+        do c = 1, merge(sub%n_contacts, 0, problem%cell_moves())
           moving(:) = problem%cell%added(problem%cell%free, sub%cell%branch(:, c), sub%cell%way(:, c))
           speed = norm2(moving)
           scales(1) = max(scales(1), speed/lightest)

@@ -80,10 +80,9 @@ contains
     n = size(self%wrench, 1)
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      associate (sub => step%problem%sub(s), list => step%halo%view(s)%list, id => step%halo%view(s)%bodies%id)
+      associate (sub => step%problem%sub(s), view => step%halo%view(s), id => step%halo%view(s)%bodies%id)
         do c = 1, sub%n_contacts
-          i = list%candidate(sub%source(c))
-          j = list%antagonist(sub%source(c))
+          call view%find_ends(sub%source(c), i, j)
           do b = 1, size(self%id)
             first = (b - 1)*n
             if (id(i) == self%id(b)) call add_contact(step%problem, s, c, 1, parts(first + 1:first + n, s))

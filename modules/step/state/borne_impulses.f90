@@ -11,7 +11,7 @@ module gravier_borne_impulses
   use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: contacts_t, impulses_t, find_seen, find_borne, leave_out, take_back
@@ -50,9 +50,9 @@ contains
   end subroutine find_seen
 
   !> Sums over some contacts of their impulses on the grains that sleep in the problem, or on all grains. Collective.
-  subroutine find_borne(decomposition, halo, problem, some, all_grains, borne)
+  subroutine find_borne(decomposition, views, problem, some, all_grains, borne)
     type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     type(contact_problem_t), intent(in) :: problem
     !> contacts that count, of each subdomain of this rank
     type(contacts_t), intent(in) :: some(:)
@@ -68,7 +68,7 @@ contains
       n = 0
       do s = 1, size(problem%sub)
         if (.not. any(some(s)%are)) cycle
-        associate (sub => problem%sub(s), view => halo%view(s))
+        associate (sub => problem%sub(s), view => views(s))
           if (round == 1) call sum_impulses(problem, s, some(s)%are, part(s)%on)
           call find_seen(view%list, sub, seen)
           do b = merge(1, sub%n_grains + 1, all_grains), sub%n_columns
@@ -122,42 +122,42 @@ contains
   end subroutine sum_impulses
 
   !> Leave contacts of a solved problem out of the next ones: what sleeps bears their impulses from now on. Collective.
-  subroutine leave_out(problem, leaving, halo, decomposition)
+  subroutine leave_out(problem, leaving, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
     !> contacts all of whose grains sleep now, of each subdomain of this rank
     type(contacts_t), intent(in) :: leaving(:)
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
-    call change_held(problem, leaving, 1, halo, decomposition)
+    call change_held(problem, leaving, 1, views, decomposition)
   end subroutine leave_out
 
   !> Give back what was borne of the contacts that are in a problem again, in which the impulses kept have just been recalled.
   !> Collective.
-  subroutine take_back(problem, halo, decomposition)
+  subroutine take_back(problem, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
     type(contacts_t) :: returning(size(problem%sub))
     integer :: s, c
 
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => halo%view(s)%list)
+      associate (sub => problem%sub(s), list => views(s)%list)
         allocate (returning(s)%are(sub%n_contacts))
         do c = 1, sub%n_contacts
           returning(s)%are(c) = list%state(list%memory%touch_row, sub%source(c)) == 1
         end do
       end associate
     end do
-    call change_held(problem, returning, 0, halo, decomposition)
+    call change_held(problem, returning, 0, views, decomposition)
   end subroutine take_back
 
   !> Mark contacts as left out (1) or as solved (0), and add their impulses to what sleeping bodies bear, or take them away.
   !> Collective.
-  subroutine change_held(problem, some, mark, halo, decomposition)
+  subroutine change_held(problem, some, mark, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
     type(contacts_t), intent(in) :: some(:)
     integer, intent(in) :: mark
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
     type(impulses_t) :: borne(size(decomposition%owned))
     integer :: s, c, k
@@ -168,9 +168,9 @@ contains
       changes = changes .or. any(some(s)%are)
     end do
     if (.not. decomposition%comm%any_true(changes)) return
-    call find_borne(decomposition, halo, problem, some, mark == 1, borne)
+    call find_borne(decomposition, views, problem, some, mark == 1, borne)
     do s = 1, size(some)
-      associate (list => halo%view(s)%list)
+      associate (list => views(s)%list)
         do c = 1, size(some(s)%are)
           if (some(s)%are(c)) list%state(list%memory%touch_row, problem%sub(s)%source(c)) = mark
         end do

@@ -8,6 +8,7 @@ module gravier_overlap_projection
   use gravier_contact_problem, only: contact_problem_t
   use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: subtract_images
+  use gravier_boundary, only: boundary_t
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
   use gravier_velocity_return, only: take_displacements
@@ -68,8 +69,7 @@ contains
     logical :: has_driven
 
     call start_timer(phase_projection)
-    has_driven = any(decomposition%boundaries%free(1)) .or. any(decomposition%boundaries%free(2)) .or. &
-      & any(decomposition%boundaries%free(3))
+    has_driven = has_free(decomposition%boundaries)
     do s = 1, size(problem%sub)
       call lend(problem, s, h, allowed, borrowed(s))
     end do
@@ -89,7 +89,7 @@ contains
       end do
       if (excess(problem, borrowed) <= enough) exit
     end do
-    factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
+    factor = reduction(problem, max(0.5_dp*decomposition%alert_distance(), allowed))
     do s = 1, size(problem%sub)
       problem%sub(s)%v_global(:, :) = factor*problem%sub(s)%velocity
       call give_back(problem, s, borrowed(s))
@@ -99,6 +99,17 @@ contains
     if (has_driven) call take_boundary_displacements(decomposition, problem)
     call stop_timer(phase_projection)
   end subroutine project_overlaps
+
+  !> Whether forces move some boundary along some axis.
+  pure logical function has_free(boundaries)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer :: d
+
+    has_free = .false.
+    do d = 1, 3
+      has_free = has_free .or. any(boundaries%free(d))
+    end do
+  end function has_free
 
   !> One sweep over the blocks that are swept.
   subroutine sweep_runs(kernels, borrowed, sub)
@@ -230,7 +241,7 @@ contains
       allocate (borrowed%law(lanes, merge(2, 1, problem%nf > 1), size(sub%hot, 3)))
       allocate (borrowed%work, mold=sub%impulse)
       call sub%contact_velocity(problem%kernels, sub%v_global, borrowed%work)
-      if (problem%cell%moves) call subtract_images(problem, s, borrowed%work)
+      if (problem%cell_moves()) call subtract_images(problem, s, borrowed%work)
       call move_alloc(sub%impulse, borrowed%impulse)
       allocate (sub%impulse, mold=borrowed%impulse)
       allocate (borrowed%is_touched(sub%n_columns), borrowed%is_swept(size(sub%hot, 3)), source=.false.)

@@ -34,7 +34,7 @@ contains
         end do
       end associate
     end do
-    if (problem%cell%moves) call carry_grains(decomposition, problem%cell)
+    if (problem%cell_moves()) call carry_grains(decomposition, problem%cell)
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 

@@ -41,7 +41,7 @@ contains
     do s = 1, size(halo%view)
       associate (view => halo%view(s))
         call move_alloc(view%bodies%wakes_at, aside(s)%wakes_at)
-        allocate (view%bodies%wakes_at(view%bodies%n), source=0.0_dp)
+        allocate (view%bodies%wakes_at(view%n_bodies()), source=0.0_dp)
         call move_alloc(view%list%watched, aside(s)%watched)
         aside(s)%state = view%list%state
       end associate
@@ -51,7 +51,7 @@ contains
     do s = 1, size(whole%sub)
       whole%sub(s)%impulse(:, :, :) = 0.0_dp
     end do
-    call recall_impulses(halo, whole)
+    call recall_impulses(halo%view, whole)
     call whole%evaluate()
     do s = 1, size(halo%view)
       call take_velocities(solved%sub(s), whole%sub(s))

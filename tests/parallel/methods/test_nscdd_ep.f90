@@ -142,7 +142,7 @@ contains
               force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(min(d, size(sub%weight, 1)), b)
             end do
           end do
-          call method%matrix%solve(sim%problem, s, force, error)
+          call method%matrix%solve(sim%problem%sub(s), s, force, error)
           part%body_work(:, :) = force
           deallocate (force)
         end associate

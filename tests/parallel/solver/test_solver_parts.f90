@@ -127,7 +127,7 @@ contains
     call make_column(n, subdomains, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0 /"//newline// &
       & "&boundary shape = 'plane', point = -0.8, 0.4, normal = 0.8, 0.6 /"//newline// &
       & "&boundary shape = 'plane', point = 0.96, 0.72, normal = -0.96, 0.28 /"//newline//"&solver method = 'nscdd' /", sim)
-    call find_supports(sim%problem, supports)
+    call find_supports(sim%problem%sub, sim%problem%comm, sim%problem%load(1:sim%problem%nd), supports)
     do s = 1, size(supports)
       associate (sub => sim%problem%sub(s))
         do b = sub%n_grains + 1, sub%n_columns
@@ -144,7 +144,7 @@ contains
       do s = 1, size(ways)
         where (supports(s)%column) ways(s)%length = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_grains
           call check_close(ways(s)%length(b), sim%problem%sub(s)%id(b) - merge(0.0_dp, 0.5_dp, round == 1), rounding, &
@@ -153,7 +153,7 @@ contains
       end do
     end do
     sim%problem%load(:) = 0.0_dp
-    call find_supports(sim%problem, supports)
+    call find_supports(sim%problem%sub, sim%problem%comm, sim%problem%load(1:sim%problem%nd), supports)
     do s = 1, size(supports)
       call check(.not. any(supports(s)%column), "without a load nothing supports")
     end do
@@ -852,10 +852,10 @@ contains
       sim%problem%sub(s)%velocity(:, :) = sim%problem%sub(s)%v_global
       matrix%part(s)%law_velocity(:, :, :) = 0.0_dp
       matrix%part(s)%law_velocity(1, 1, 1) = v
-      call matrix%enrich(sim%problem, s, error)
+      call matrix%enrich(sim%problem%kernels, sim%problem%sub(s), s, error)
       call feedback%keep_lead(s, matrix)
     end do
-    call make_field(sim%problem, multipliers)
+    call make_field(sim%problem%shared, multipliers)
     call feedback%take(sim%problem, matrix, multipliers, error)
     call check(.not. allocated(error), "impulses are fed back")
     call check_close(feedback%share, min(1.0_dp, 0.75_dp/(0.75_dp*(0.75_dp + v))), rounding, "part of the way that is taken")

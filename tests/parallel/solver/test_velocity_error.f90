@@ -128,7 +128,7 @@ contains
         call check(all(ways(s)%length >= unreached), "no way is known before a root is")
         ways(s)%length(sim%problem%sub(s)%n_bodies + 1:) = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_bodies
           expected = place(sim%problem, s, b, count)
@@ -167,7 +167,7 @@ contains
       do s = 1, size(ways)
         ways(s)%length(sim%problem%sub(s)%n_bodies + 1:) = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_bodies
           call check((ways(s)%length(b) < unreached) .eqv. (k == 1 .or. place(sim%problem, s, b, count) <= cut), &

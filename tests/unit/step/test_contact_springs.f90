@@ -112,14 +112,14 @@ contains
       sub%impulse(1, :, 1) = 0.7_dp
       v(:) = 0.2_dp
       if (dimension == 2) v(2) = -0.2_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       kept(:) = 0.0_dp
       do d = 2, dimension
         kept(d - 1) = expected%elongation(d, h, 0.7_dp, v(d), slides=.true.)
       end do
       call check_close(maxval(abs(list%spring(:, 1) - kept(1:size(list%spring, 1)))), 0.0_dp, rounding, "elongations are kept")
       call check(list%keeps(1), "a pair with an elongation is kept")
-      call spring_energies(problem, 1, halo, physics, energies)
+      call spring_energies(problem, 1, halo%view, physics, energies)
       call check_close(energies(1, 1), 400.0_dp*(gap - 0.5_dp*h*velocity(1))**2*merge(1.0_dp, 0.0_dp, gap < 0.5_dp*h*velocity(1)), &
         & rounding, "normal energy at the start")
       call check_close(energies(2, 1), 150.0_dp*sum((sub%spring(1)%stretch(:dimension - 1) - 0.5_dp*h*velocity(2:))**2)* &
@@ -131,16 +131,16 @@ contains
       call check_close(energies(2, 2), 150.0_dp*sum(carried(1:dimension - 1)**2), 10*rounding, "tangential energy where it slides")
       ! where it sticks, from what it was packed with on: the bodies have moved on, whatever the force is
       sub%hot(1, row%friction, 1) = 2.0_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       kept(1:2) = sub%spring(1)%stretch
       kept(1:dimension - 1) = kept(1:dimension - 1) + h*v(2:)
       call check_close(maxval(abs(list%spring(:, 1) - kept(1:size(list%spring, 1)))), 0.0_dp, rounding, &
         & "a contact that sticks is stretched by what its bodies move")
-      call spring_energies(problem, 1, halo, physics, energies)
+      call spring_energies(problem, 1, halo%view, physics, energies)
       call check_close(energies(2, 2), 150.0_dp*sum((kept(1:dimension - 1) - 0.5_dp*h*v(2:))**2), 10*rounding, &
         & "tangential energy where it sticks")
       sub%impulse(:, :, :) = 0.0_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       call check_close(maxval(abs(list%spring)), 0.0_dp, 0.0_dp, "a contact that carries nothing forgets")
       ! the bodies met half a step before q_m
       call pack_spring(list, spring, problem%kernels, physics, 1, velocity, sub)
