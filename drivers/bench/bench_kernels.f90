@@ -10,7 +10,7 @@ module gravier_bench_kernels
   use gravier_effects, only: effects_t
   use gravier_contact_data, only: contact_rows_t
   use gravier_contact_kernels, only: kernels_t
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method, only: start_sweeps
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_machine, only: last_cache
@@ -187,7 +187,7 @@ contains
       effects = simulation%effects
       effects%tangential_restitution = index(name, "tangential") > 0
       effects%rolling = index(name, "roll") > 0
-      call simulation%problem%kernels%choose(packing%nd, effects)
+      call simulation%problem%choose_kernels(packing%nd, effects)
       contact = simulation%config%scene%contact
       contact%rolling_friction = rolling_friction
       contact%pivoting_friction = rolling_friction

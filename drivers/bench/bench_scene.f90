@@ -253,7 +253,7 @@ contains
     do m = 2, size(self%figures%interface_statistics%multiplicity)
       n = n + (m - 1)*self%figures%interface_statistics%multiplicity(m)
     end do
-    n = n*self%simulation%problem%kernels%nv
+    n = n*self%simulation%problem%nv
   end function bench_scene_unknowns
 
 end module gravier_bench_scene

@@ -97,7 +97,7 @@ contains
     real(dp) :: turned(3), radians
     integer :: s, b, nd
 
-    nd = simulation%problem%kernels%nd
+    nd = simulation%problem%nd
     radians = angle*acos(-1.0_dp)/180.0_dp
     associate (g => simulation%physics%gravity)
       turned(1:nd) = g(1:nd)
@@ -123,7 +123,7 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do b = 1, sub%n_grains
-          do d = 1, problem%kernels%nd
+          do d = 1, problem%nd
             sub%v_free(d, b) = sub%v_free(d, b) + speed*(2.0_dp*hash_uniform(seed, sub%id(b), d) - 1.0_dp)
           end do
         end do

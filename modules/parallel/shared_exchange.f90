@@ -18,18 +18,15 @@ module gravier_shared_exchange
   type :: shared_part_t
     !> global number of the subdomain, from 1
     integer :: subdomain = 0
-    integer :: n_shared = 0
+    integer :: n_shared = 0, n_slots = 0
     !> local number of each shared body, by ascending identifier (n_shared)
     integer, allocatable :: body(:)
     !> first sharer of each shared body (n_shared + 1)
     integer, allocatable :: first(:)
-    !> subdomains that hold a copy, ascending, this one included
-    integer, allocatable :: sharer(:)
-    !> slot of each sharer, 0 for this subdomain
-    integer, allocatable :: slot(:)
+    !> subdomains that hold a copy, ascending, this one included, and the slot of each, 0 for this one
+    integer, allocatable :: sharer(:), slot(:)
     !> place of this subdomain among the sharers of each shared body, from 1 (n_shared)
     integer, allocatable :: copy_rank(:)
-    integer :: n_slots = 0
     !> shared body that each slot is a copy of, and its local number (n_slots)
     integer, allocatable :: slot_shared(:), slot_body(:)
     !> neighbouring subdomains, ascending, and the first slot of each (one more entry at the end)
@@ -42,16 +39,13 @@ module gravier_shared_exchange
 
   !> A stretch of slots that travels to, or comes from, another rank.
   type :: segment_t
-    !> local subdomain
-    integer :: part = 0
-    !> first and last slot
-    integer :: from = 0, to = 0
+    !> local subdomain, first and last slot
+    integer :: part = 0, from = 0, to = 0
   end type segment_t
 
   !> All that passes between this rank and another.
   type :: channel_t
-    integer :: rank = 0
-    integer :: n_slots = 0
+    integer :: rank = 0, n_slots = 0
     !> stretches sent in order, and stretches received in order
     type(segment_t), allocatable :: outgoing(:), incoming(:)
     real(dp), allocatable :: send(:), recv(:)
@@ -75,6 +69,7 @@ module gravier_shared_exchange
   contains
     procedure :: init => shared_exchange_init
     procedure :: pass => shared_exchange_pass
+    procedure :: n_shared => shared_exchange_n_shared
     procedure :: is_far => shared_exchange_is_far
     procedure :: start => shared_exchange_start
     procedure :: finish => shared_exchange_finish
@@ -178,14 +173,12 @@ contains
     integer, allocatable, intent(inout) :: list(:)
     integer, intent(in) :: value
     integer, allocatable :: longer(:)
-    integer :: n, k
+    integer :: k
 
     if (place_of(list, value) > 0) return
-    n = size(list)
     k = count(list < value)
-    allocate (longer(n + 1))
+    allocate (longer(size(list) + 1), source=value)
     longer(1:k) = list(1:k)
-    longer(k + 1) = value
     longer(k + 2:) = list(k + 1:)
     call move_alloc(longer, list)
   end subroutine insert
@@ -356,6 +349,13 @@ contains
     call self%start()
     call self%finish()
   end subroutine shared_exchange_pass
+
+  !> Bodies that part `p` shares with other subdomains.
+  pure integer function shared_exchange_n_shared(self, p) result(n_shared)
+    class(shared_exchange_t), intent(in) :: self
+    integer, intent(in) :: p
+    n_shared = self%part(p)%n_shared
+  end function shared_exchange_n_shared
 
   !> Whether part `p` shares bodies with subdomains on other ranks.
   pure logical function shared_exchange_is_far(self, p) result(is_far)

@@ -75,10 +75,8 @@ module gravier_time_stepper
     logical :: warm_start = .true.
     !> contacts that the first solve starts from, where the bodies file has some; none afterwards
     type(given_contacts_t) :: given
-    !> overlap beyond which places are projected; huge where that is off [m]
-    real(dp) :: overlap_allowed = huge(1.0_dp)
-    !> what a projection leaves of it [m]
-    real(dp) :: overlap_left = huge(1.0_dp)
+    !> overlap beyond which places are projected, and what a projection leaves of it; huge where that is off [m]
+    real(dp) :: overlap_allowed = huge(1.0_dp), overlap_left = huge(1.0_dp)
     type(sleeping_rule_t) :: sleeping
     type(repartition_rule_t) :: division
     type(inflow_t) :: inflow ! grains that enter
@@ -210,7 +208,7 @@ contains
         call solve_contacts(self%problem, self%method, control, figures%solve, error, self%exact, watch)
       end if
       if (self%physics%laws%breaks .and. .not. (allocated(error) .or. self%velocity_scale%moves())) then
-        if (bonds_at_limit(self%problem, self%decomposition%boundaries, self%physics%laws, self%halo)) &
+        if (bonds_at_limit(self%problem, self%decomposition%boundaries, self%physics%laws, self%halo%view)) &
           & call self%refinement%settle(self%problem, self%method, control, figures%solve, error, watch)
       end if
       if (self%resting%bodies == 0) call self%fallback%take_over(self%problem, control, figures%solve, error, self%exact, watch)
@@ -233,7 +231,7 @@ contains
       figures%tries = tries + 1
       iterations = figures%solve%iterations
       seconds = figures%solve%seconds
-      if (self%warm_start) call keep_impulses(self%problem, self%halo)
+      if (self%warm_start) call keep_impulses(self%problem, self%halo%view)
       call watch_awake(self%decomposition, self%halo, self%resting)
       call set_up(self, figures)
     end do
@@ -282,12 +280,12 @@ contains
       & figures%interface_statistics)
     call start_timer(phase_setup)
     if (self%given%total > 0) then
-      call take_given_impulses(self%given, self%decomposition, self%physics, self%problem, self%halo, figures%started)
+      call take_given_impulses(self%given, self%decomposition, self%physics, self%problem, self%halo%view, figures%started)
       self%given = given_contacts_t()
     end if
-    if (self%warm_start) call recall_impulses(self%halo, self%problem)
-    if (self%resting%bodies > 0) call take_back(self%problem, self%halo, self%decomposition)
-    if (self%problem%cell%moves) call start_response(self%problem)
+    if (self%warm_start) call recall_impulses(self%halo%view, self%problem)
+    if (self%resting%bodies > 0) call take_back(self%problem, self%halo%view, self%decomposition)
+    if (self%problem%cell_moves()) call start_response(self%problem)
     call stop_timer(phase_setup)
     self%problem%load(:) = self%physics%h*self%physics%gravity
     figures%contacts = self%problem%n_contacts + self%resting%contacts
@@ -355,18 +353,19 @@ contains
     type(contact_problem_t), intent(inout) :: whole
     logical :: doubtful
 
-    if (self%problem%cell%moves) then
+    if (self%problem%cell_moves()) then
       call take_cell(self%problem, self%decomposition%period)
       self%physics%cell = self%problem%cell
     end if
-    if (self%sleeping%after > 0) call count_rest(self%sleeping, figures%tries == 1, self%halo, self%problem, self%decomposition)
-    if (self%warm_start) call keep_impulses(self%problem, self%halo)
+    if (self%sleeping%after > 0) call count_rest(self%sleeping, figures%tries == 1, self%halo%view, self%problem, &
+      & self%decomposition)
+    if (self%warm_start) call keep_impulses(self%problem, self%halo%view)
     if (.not. self%is_whole .and. (self%diagnostics%in_each_step() .or. self%written_steps%due(self%step + 1) .or. &
       & self%step + 1 == self%dumped_step)) call build_whole(self%decomposition, self%halo, self%physics, self%problem, whole)
-    if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo)
+    if (self%physics%laws%yields) call conclude_springs(self%problem, self%physics%h, self%halo%view)
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%refinement%doubt(figures%uncertain_velocity(self%velocity_scale%bonds), &
-      & self%control%accuracy*self%velocity_scale%value), self%velocity_scale%moves(), self%halo, doubtful)
+      & self%control%accuracy*self%velocity_scale%value), self%velocity_scale%moves(), self%halo%view, doubtful)
     if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, self%velocity_scale%moves() .or. self%method%keeps_best)
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)

@@ -2,7 +2,7 @@
 !> The reader, its messages and the reference in doc/keys.md all come from this table. The keys of the laws of contact, of the
 !> shapes of boundaries and of the diagnostics come from their modules, the words of the methods from theirs.
 module gravier_config_table
-  use gravier_declared_keys, only: collected_key_t, collected_keys_t, kind_length
+  use gravier_declared_keys, only: declared_key_t, collected_keys_t, kind_length
   use gravier_config_key, only: group_t, key_t, kind_integer, kind_real, kind_logical, kind_choice, kind_text
   use gravier_config_table_grains, only: made_keys, source_keys, prepared_keys, where_keys, material_keys
   use gravier_law_registry, only: collect_law_keys => law_keys
@@ -384,7 +384,7 @@ contains
     call add(shape_keys)
     call surface_keys(surface_rows)
     do k = 1, size(surface_rows%keys)
-      row(1) = row_of("boundary", "shape", surface_rows%keys(k))
+      row(1) = row_of("boundary", "shape", surface_rows%keys(k)%key, surface_rows%keys(k)%kinds)
       call add(row)
     end do
     call add(boundary_keys)
@@ -399,7 +399,7 @@ contains
     call collect_law_keys(own)
     keys(size(keys))%allowed = own%kinds
     do k = 1, size(own%keys)
-      row(1) = row_of("law", "kind", own%keys(k))
+      row(1) = row_of("law", "kind", own%keys(k)%key, own%keys(k)%kinds)
       call add(row)
     end do
     call add(time_keys)
@@ -484,16 +484,16 @@ contains
   end subroutine complete_solver_keys
 
   !> The row of a key that some kinds of a group have.
-  pure type(key_t) function row_of(group, chooser, own) result(row)
-    !> the group, and its key that says the kind
-    character(len=*), intent(in) :: group, chooser
-    type(collected_key_t), intent(in) :: own
+  pure type(key_t) function row_of(group, chooser, key, kinds) result(row)
+    !> the group, and its key that says the kind; the kinds that have the key
+    character(len=*), intent(in) :: group, chooser, kinds
+    type(declared_key_t), intent(in) :: key
 
-    row = key_t(group, own%key%name, kind_real, own%key%default, own%key%allowed, own%key%meaning, count=own%key%count, &
-      & unit=own%key%unit, chooser=chooser, chosen=own%kinds)
-    if (own%key%default /= "") return
+    row = key_t(group, key%name, kind_real, key%default, key%allowed, key%meaning, count=key%count, unit=key%unit, &
+      & chooser=chooser, chosen=kinds)
+    if (key%default /= "") return
     row%default = "0"
-    if (own%key%count == 3) row%default = "3*0"
+    if (key%count == 3) row%default = "3*0"
     row%note = "required"
   end function row_of
 

@@ -4,7 +4,8 @@ module gravier_body_collector
   use gravier_kinds, only: dp, i8
   use gravier_boundary, only: boundary_t
   use gravier_body_mass, only: invert_symmetric, multiply_symmetric
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_body_store, only: collect_fields
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
@@ -165,10 +166,10 @@ contains
     integer(i8), allocatable :: place(:, :)
     integer :: s, b, d, n, nv
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     n = sum(problem%sub%n_bodies)
     call table%init("bodies", "id", n)
-    allocate (place(3, n), mass(nv, n), load(nv, n), velocity(nv, n), inertia(merge(3, 0, problem%kernels%nw == 9), n))
+    allocate (place(3, n), mass(nv, n), load(nv, n), velocity(nv, n), inertia(merge(3, 0, problem%nw == 9), n))
     n = 0
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -181,7 +182,7 @@ contains
           velocity(:, n) = sub%v_global(1:nv, b)
           do d = 1, nv
             mass(d, n) = 1.0_dp
-            if (sub%moves(d, b)) mass(d, n) = 1.0_dp/sub%inverse_mass(min(d, problem%kernels%nw), b)
+            if (sub%moves(d, b)) mass(d, n) = 1.0_dp/sub%inverse_mass(min(d, problem%nw), b)
             load(d, n) = mass(d, n)*sub%v_free(d, b)
           end do
           if (size(inertia, 1) > 0) call take_inertia(sub, b, mass(4:6, n), inertia(:, n), load(4:6, n))

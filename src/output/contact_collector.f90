@@ -5,7 +5,7 @@ module gravier_contact_collector
   use gravier_contact_places, only: find_contact_place
   use gravier_contact_springs, only: find_elongation
   use gravier_contact_law, only: unused
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -73,13 +73,13 @@ contains
 
     select case (name)
     case ("normal", "impulse")
-      n = simulation%problem%kernels%nd
+      n = simulation%problem%nd
     case ("moment")
-      n = merge(2*simulation%problem%kernels%nd - 3, 0, simulation%problem%kernels%rolling_row > 0)
+      n = merge(2*simulation%problem%nd - 3, 0, simulation%problem%has_rolling())
     case ("point")
-      n = merge(simulation%problem%kernels%nd, 0, simulation%problem%kernels%row%arm_i > 0)
+      n = merge(simulation%problem%nd, 0, simulation%problem%has_shapes())
     case ("elongation")
-      n = merge(simulation%problem%kernels%nd, 0, simulation%halo%memory%n_spring > 0)
+      n = merge(simulation%problem%nd, 0, simulation%halo%memory%n_spring > 0)
     case ("points")
       n = 6
     case default
@@ -176,7 +176,7 @@ contains
           call find_elongation(simulation%halo%view(s)%list, sub, c, values(:, c))
         end do
       case ("points")
-        if (kernels%row%arm_i > 0) then
+        if (kernels%has_shapes()) then
           call take_ways(simulation, s, values)
         else
           call take_points(simulation, s, values)
@@ -223,7 +223,7 @@ contains
     real(dp) :: reach
     integer :: c, p, nd
 
-    nd = simulation%problem%kernels%nd
+    nd = simulation%problem%nd
     point(:, :) = 0.0_dp
     associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
       do c = 1, sub%n_contacts
@@ -260,10 +260,10 @@ contains
     integer, intent(in) :: s
     !> (6, contacts)
     real(dp), intent(out) :: point(:, :)
-    real(dp) :: arm_i(simulation%problem%kernels%nd), arm_j(simulation%problem%kernels%nd)
+    real(dp) :: arm_i(simulation%problem%nd), arm_j(simulation%problem%nd)
     integer :: c, nd
 
-    nd = simulation%problem%kernels%nd
+    nd = simulation%problem%nd
     point(:, :) = 0.0_dp
     associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
       do c = 1, sub%n_contacts

@@ -10,7 +10,8 @@ module gravier_problem_dump
   use gravier_errors, only: error_t
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: contact_jacobian, tangents, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_field_list, only: field_list_t
   use gravier_fclib_file, only: fclib_rows_t
   use gravier_fclib_writer, only: write_fclib_global
@@ -39,7 +40,7 @@ contains
     character(len=1), parameter :: no_fields(0) = ""
 
     if (allocated(error)) return
-    rows%dimension = simulation%problem%kernels%nd
+    rows%dimension = simulation%problem%nd
     ! a projection of overlaps has used the velocities for its own
     call simulation%problem%evaluate()
     call collect_problem_bodies(simulation%problem, bodies)
@@ -49,7 +50,7 @@ contains
     call collect_contacts(simulation, no_fields, contacts)
     call add_columns(simulation%problem, places, contacts)
     call contacts%order(simulation%comm)
-    call take_contacts(contacts, rows%dimension, simulation%problem%kernels%nv, rows)
+    call take_contacts(contacts, rows%dimension, simulation%problem%nv, rows)
     call write_fclib_global(simulation%comm, path, rows, error)
   end subroutine write_problem
 
@@ -187,8 +188,8 @@ contains
     real(dp), allocatable :: mu(:, :), w(:, :), r(:, :), u(:, :), h(:, :)
     integer :: s, c, k, n, nd, nv
 
-    nd = problem%kernels%nd
-    nv = problem%kernels%nv
+    nd = problem%nd
+    nv = problem%nv
     n = contacts%n_items()
     allocate (bodies(2, n), source=0_i8)
     allocate (mu(1, n), w(nd, n), r(nd, n), u(nd, n), h(2*nd*nv, n), source=0.0_dp)
@@ -200,8 +201,8 @@ contains
           do k = 1, 2
             if (sub%pair(k, c) <= sub%n_bodies) bodies(k, n) = places(s)%place(sub%pair(k, c))
           end do
-          if (problem%kernels%nc > 1) mu(1, n) = sub%hot(lane_of(c), problem%kernels%friction_row, block_of(c))
-          k = min(nd, problem%kernels%nc)
+          if (problem%nc > 1) mu(1, n) = sub%hot(lane_of(c), problem%friction_row, block_of(c))
+          k = min(nd, problem%nc)
           r(1:k, n) = sub%impulse(lane_of(c), 1:k, block_of(c))
           call take_rows(problem, sub, c, w(:, n), u(:, n), h(:, n))
         end do
@@ -222,14 +223,14 @@ contains
     integer, intent(in) :: c
     !> (nd), (nd), (2 nd nv) by component, then by side
     real(dp), intent(inout) :: w(:), u(:), h(:)
-    real(dp) :: jacobian(problem%kernels%nd, problem%kernels%nv, 2)
+    real(dp) :: jacobian(problem%nd, problem%nv, 2)
     integer :: side, body, d, k, at, nd, nv
 
-    nd = problem%kernels%nd
-    nv = problem%kernels%nv
+    nd = problem%nd
+    nv = problem%nv
     call full_jacobian(problem, sub, c, jacobian)
     w(1) = sub%hot(lane_of(c), nd + 1, block_of(c))
-    associate (row => problem%kernels%shift_row)
+    associate (row => problem%shift_row)
       if (row > 0) w(2:) = sub%hot(lane_of(c), row + 1:row + nd - 1, block_of(c))
     end associate
     u(:) = w
@@ -261,7 +262,7 @@ contains
     real(dp) :: normal(size(jacobian, 1)), t(3), s(3)
     integer :: nc
 
-    nc = problem%kernels%nc
+    nc = problem%nc
     jacobian(:, :, :) = 0.0_dp
     call contact_jacobian(problem%kernels, sub%hot, c, jacobian(1:nc, :, 1), jacobian(1:nc, :, 2))
     if (nc > 1) return

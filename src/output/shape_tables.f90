@@ -2,7 +2,7 @@
 !> space, their faces. Lengths are those of a body of radius 1, in its principal axes from its centre of mass.
 module gravier_shape_tables
   use gravier_kinds, only: dp, i8
-  use gravier_shape_library, only: shape_library_t
+  use gravier_shape_library, only: shape_library_t, body_shape_t
   use gravier_field_list, only: field_list_t
   implicit none
   private
@@ -16,16 +16,25 @@ contains
     type(shape_library_t), intent(in) :: library
     integer, intent(in) :: nd
     type(field_list_t), allocatable, intent(out) :: table(:)
+
+    allocate (table(merge(3, 5, nd == 2)))
+    call fill_tables(library%shape(1:library%n), nd, table)
+  end subroutine describe_shapes
+
+  subroutine fill_tables(library, nd, table)
+    type(body_shape_t), intent(in) :: library(:)
+    integer, intent(in) :: nd
+    type(field_list_t), intent(inout) :: table(:)
     integer :: n_pieces, n_vertices, n_faces, n_corners, k, p
 
     n_pieces = 0
     n_vertices = 0
     n_faces = 0
     n_corners = 0
-    do k = 1, library%n
-      n_pieces = n_pieces + size(library%shape(k)%piece)
-      do p = 1, size(library%shape(k)%piece)
-        associate (piece => library%shape(k)%piece(p))
+    do k = 1, size(library)
+      n_pieces = n_pieces + size(library(k)%piece)
+      do p = 1, size(library(k)%piece)
+        associate (piece => library(k)%piece(p))
           n_vertices = n_vertices + size(piece%vertex, 2)
           if (nd == 2) cycle
           n_faces = n_faces + size(piece%face_first) - 1
@@ -33,8 +42,7 @@ contains
         end associate
       end do
     end do
-    allocate (table(merge(3, 5, nd == 2)))
-    call begin(table(1), "shapes", library%n)
+    call begin(table(1), "shapes", size(library))
     call begin(table(2), "pieces", n_pieces)
     call begin(table(3), "vertices", n_vertices)
     call add_shapes(library, nd, table(1))
@@ -44,7 +52,7 @@ contains
     call begin(table(4), "faces", n_faces)
     call begin(table(5), "face_vertices", n_corners)
     call add_faces(library, table(4), table(5))
-  end subroutine describe_shapes
+  end subroutine fill_tables
 
   subroutine begin(table, name, n)
     type(field_list_t), intent(inout) :: table
@@ -60,16 +68,17 @@ contains
   end subroutine begin
 
   subroutine add_shapes(library, nd, table)
-    type(shape_library_t), intent(in) :: library
+    type(body_shape_t), intent(in) :: library(:)
     integer, intent(in) :: nd
     type(field_list_t), intent(inout) :: table
-    character(len=64) :: name(library%n)
+    character(len=64) :: name(size(library))
     real(dp), allocatable :: extent(:, :), volume(:, :), inertia(:, :), turn(:, :)
     integer :: k
 
-    allocate (extent(1, library%n), volume(1, library%n), inertia(merge(1, 3, nd == 2), library%n), turn(4, library%n))
-    do k = 1, library%n
-      associate (shape => library%shape(k))
+    allocate (extent(1, size(library)), volume(1, size(library)), inertia(merge(1, 3, nd == 2), size(library)))
+    allocate (turn(4, size(library)))
+    do k = 1, size(library)
+      associate (shape => library(k))
         name(k) = shape%name
         extent(1, k) = shape%size
         volume(1, k) = shape%volume
@@ -85,7 +94,7 @@ contains
   end subroutine add_shapes
 
   subroutine add_pieces(library, table)
-    type(shape_library_t), intent(in) :: library
+    type(body_shape_t), intent(in) :: library(:)
     type(field_list_t), intent(inout) :: table
     integer(i8), allocatable :: shape(:, :)
     real(dp), allocatable :: rounding(:, :)
@@ -93,11 +102,11 @@ contains
 
     allocate (shape(1, table%n_items()), rounding(1, table%n_items()))
     n = 0
-    do k = 1, library%n
-      do p = 1, size(library%shape(k)%piece)
+    do k = 1, size(library)
+      do p = 1, size(library(k)%piece)
         n = n + 1
         shape(1, n) = k
-        rounding(1, n) = library%shape(k)%piece(p)%rounding
+        rounding(1, n) = library(k)%piece(p)%rounding
       end do
     end do
     call table%add_whole("shape", "", shape, .true.)
@@ -105,7 +114,7 @@ contains
   end subroutine add_pieces
 
   subroutine add_vertices(library, nd, table)
-    type(shape_library_t), intent(in) :: library
+    type(body_shape_t), intent(in) :: library(:)
     integer, intent(in) :: nd
     type(field_list_t), intent(inout) :: table
     integer(i8), allocatable :: piece(:, :)
@@ -115,14 +124,14 @@ contains
     allocate (piece(1, table%n_items()), vertex(nd, table%n_items()), corner(nd, table%n_items()))
     n = 0
     n_pieces = 0
-    do k = 1, library%n
-      do p = 1, size(library%shape(k)%piece)
+    do k = 1, size(library)
+      do p = 1, size(library(k)%piece)
         n_pieces = n_pieces + 1
-        do v = 1, size(library%shape(k)%piece(p)%vertex, 2)
+        do v = 1, size(library(k)%piece(p)%vertex, 2)
           n = n + 1
           piece(1, n) = n_pieces
-          vertex(:, n) = library%shape(k)%piece(p)%vertex(:, v)
-          corner(:, n) = library%shape(k)%piece(p)%corner(:, v)
+          vertex(:, n) = library(k)%piece(p)%vertex(:, v)
+          corner(:, n) = library(k)%piece(p)%corner(:, v)
         end do
       end do
     end do
@@ -132,7 +141,7 @@ contains
   end subroutine add_vertices
 
   subroutine add_faces(library, faces, corners)
-    type(shape_library_t), intent(in) :: library
+    type(body_shape_t), intent(in) :: library(:)
     type(field_list_t), intent(inout) :: faces, corners
     integer(i8), allocatable :: piece_of(:, :), face_of(:, :), vertex_of(:, :)
     real(dp), allocatable :: normal(:, :)
@@ -144,10 +153,10 @@ contains
     n_vertices = 0
     n_faces = 0
     n_corners = 0
-    do k = 1, library%n
-      do p = 1, size(library%shape(k)%piece)
+    do k = 1, size(library)
+      do p = 1, size(library(k)%piece)
         n_pieces = n_pieces + 1
-        associate (piece => library%shape(k)%piece(p))
+        associate (piece => library(k)%piece(p))
           do f = 1, size(piece%face_first) - 1
             n_faces = n_faces + 1
             piece_of(1, n_faces) = n_pieces

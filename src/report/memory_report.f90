@@ -77,7 +77,7 @@ contains
     copies = column_copies(merge(2, 1, simulation%comm%size > 1))
     associate (nd => simulation%decomposition%nd, output => simulation%config%output)
       of_grain = 2 + nd + (3*nd - 3) + merge(nd, 0, simulation%decomposition%ni > 0)
-      of_contact = merge(3 + 2*nd + merge(2*nd - 3, 0, simulation%problem%kernels%rolling_row > 0), 0, output%contacts)
+      of_contact = merge(3 + 2*nd + merge(2*nd - 3, 0, simulation%problem%has_rolling()), 0, output%contacts)
       bytes = 8*max(counts(5)*(of_grain + copies*(3*nd - 3) + ordering_words), &
         & counts(1)*merge(of_contact + copies*nd + ordering_words, 0, output%contacts))
       if (.not. output%vtk) return
@@ -107,7 +107,7 @@ contains
     call describe(simulation, items)
     contact = items(1)%bytes
     body = items(3)%bytes
-    copy = simulation%problem%kernels%nv*storage_size(0.0_dp)/8
+    copy = simulation%problem%nv*storage_size(0.0_dp)/8
   end subroutine item_bytes
 
   !> The arrays of each kind of item.
@@ -116,7 +116,7 @@ contains
     type(item_t), intent(inout) :: items(5)
     type(held_list_t) :: held
 
-    call simulation%method%held(simulation%problem%kernels%nc, simulation%problem%kernels%nv, held)
+    call simulation%method%held(simulation%problem%nc, simulation%problem%nv, held)
     call describe_contact(simulation, held, items(1))
     items(2)%name = "near pair"
     call items(2)%add("candidate", 4, 1)
@@ -243,7 +243,7 @@ contains
         counts(1) = counts(1) + sub%n_contacts
         counts(2) = counts(2) + view%list%n
         counts(3) = counts(3) + sub%n_columns
-        counts(4) = counts(4) + view%bodies%n
+        counts(4) = counts(4) + view%n_bodies()
         counts(5) = counts(5) + simulation%decomposition%owned(s)%n
       end associate
     end do

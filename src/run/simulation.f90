@@ -271,7 +271,7 @@ contains
           & solver%accuracy)
       end associate
       self%effects = scene%effects
-      call self%problem%kernels%choose(config%dimension, scene%effects)
+      call self%problem%choose_kernels(config%dimension, scene%effects)
       self%halo%memory = memory_of(self%problem%kernels, self%config%solver%warm_start, scene%laws%remembers, &
         & self%sleeping%after > 0, scene%effects%shapes .or. has_facets(scene%boundaries))
       rule%largest_radius = scene%largest_radius

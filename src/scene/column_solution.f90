@@ -24,7 +24,7 @@ contains
     class(column_solution_t), intent(in) :: self
     type(contact_problem_t), intent(in) :: problem
     real(dp), allocatable :: parts(:, :)
-    real(dp) :: sums(2), exact, impulse(problem%kernels%nc)
+    real(dp) :: sums(2), exact, impulse(problem%nc)
     integer :: s, c, upper
 
     allocate (parts(2, size(problem%sub)), source=0.0_dp)

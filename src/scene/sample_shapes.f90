@@ -43,7 +43,7 @@ contains
       data%shape(k) = number(place_of(bound, hash_uniform(config%sample%seed, data%id(k), stream_of_shapes)))
       if (data%shape(k) == 0) cycle
       call random_turn(config%sample%seed, data%id(k), stream_of_turns, data%orientation(:, k))
-      data%mass(k) = density_of(config, 1)*shapes%shape(data%shape(k))%volume*data%radius(k)**data%dimension
+      data%mass(k) = density_of(config, 1)*shapes%volume_of(data%shape(k))*data%radius(k)**data%dimension
     end do
   end subroutine draw_shapes
 

@@ -426,13 +426,8 @@ contains
     real(dp) :: of_shape(scene%shapes%n)
     integer :: k, p
 
-    of_shape(:) = huge(1.0_dp)
     do k = 1, scene%shapes%n
-      do p = 1, size(scene%shapes%shape(k)%piece)
-        associate (piece => scene%shapes%shape(k)%piece(p))
-          if (size(piece%vertex, 2) > 1) of_shape(k) = min(of_shape(k), piece%rounding)
-        end associate
-      end do
+      of_shape(k) = scene%shapes%shape(k)%least_rounding()
     end do
     do k = 1, scene%grains%n
       if (scene%grains%shape(k) == 0) cycle
@@ -473,7 +468,7 @@ contains
       if (allocated(data%mass)) then
         mass = data%mass(k)
       else if (number > 0) then
-        mass = density_of(config, data%material(k))*shapes%shape(number)%volume*radius**grains%nd
+        mass = density_of(config, data%material(k))*shapes%volume_of(number)*radius**grains%nd
       else
         mass = grain_mass(grains%nd, radius, density_of(config, data%material(k)))
       end if

@@ -5,11 +5,10 @@ module gravier_scene_boundaries
   use gravier_text, only: to_text
   use gravier_communicator, only: communicator_t
   use gravier_bodies_file, only: bodies_data_t
-  use gravier_given_contacts, only: name_length
   use gravier_surface_registry, only: make_surface, wall_of_bodies
   use gravier_mesh_file, only: read_mesh
   use gravier_boundary, only: boundary_t
-  use gravier_boundary_drive, only: drive_names, drives_velocity, drives_spin, drives_force, drives_pressure
+  use gravier_boundary_drive, only: boundary_drive_t, drive_names, drives_velocity, drives_spin, drives_force, drives_pressure
   use gravier_facing_planes, only: faces_along, open_axis, is_pressed
   use gravier_config_types, only: config_t, boundary_config_t
   use gravier_wall_side, only: wall_side_t, wall_side_of
@@ -98,7 +97,7 @@ contains
     type(boundary_t), intent(inout) :: taken(:)
     type(error_t), allocatable, intent(inout) :: error
     logical :: left(data%n_walls)
-    integer :: b, w, k
+    integer :: b, w
 
     left(:) = .true.
     do b = 1, size(taken)
@@ -113,10 +112,7 @@ contains
       end if
       left(w) = .false.
       call make_wall(data, w, taken(b))
-      if (.not. allocated(data%contacts%boundary)) cycle
-      do k = 1, size(data%contacts%boundary)
-        if (data%contacts%boundary(k) == taken(b)%name) data%contacts%boundary(k) = config%boundaries(b)%name(:name_length)
-      end do
+      call data%contacts%rename_boundary(taken(b)%name, config%boundaries(b)%name)
     end do
     if (.not. all(left)) call keep_walls(left, data)
   end subroutine take_walls
@@ -344,22 +340,28 @@ contains
     boundary%group = config%group
     ! the values were checked
     call set_surface(config, boundary%surface, wrong, expected)
-    where (config%free)
-      boundary%velocity = config%velocity
-    elsewhere
-      boundary%drive%velocity = config%velocity
-    end where
-    call take_rotation(config%rotation, boundary%drive%spin)
-    call take_rotation(config%rotation_oscillation, boundary%drive%rotation_oscillation)
-    boundary%drive%oscillation(:) = config%oscillation
-    boundary%drive%frequency = config%frequency
-    boundary%drive%phase = config%phase
+    where (config%free) boundary%velocity = config%velocity
     boundary%free(:) = config%free
-    boundary%drive%force(:) = config%force
-    boundary%drive%pressure = config%pressure
     boundary%mass = config%mass
     boundary%contact = config%contact
     boundary%remove_at = config%remove_at
+    call set_drive(config, nd, boundary%drive)
+  end subroutine set_boundary
+
+  !> What is prescribed of a boundary, but for what a table gives.
+  subroutine set_drive(config, nd, drive)
+    type(boundary_config_t), intent(in) :: config
+    integer, intent(in) :: nd
+    type(boundary_drive_t), intent(inout) :: drive
+
+    where (.not. config%free) drive%velocity = config%velocity
+    call take_rotation(config%rotation, drive%spin)
+    call take_rotation(config%rotation_oscillation, drive%rotation_oscillation)
+    drive%oscillation(:) = config%oscillation
+    drive%frequency = config%frequency
+    drive%phase = config%phase
+    drive%force(:) = config%force
+    drive%pressure = config%pressure
 
   contains
 
@@ -374,6 +376,6 @@ contains
       rotation(1) = 0.0_dp
     end subroutine take_rotation
 
-  end subroutine set_boundary
+  end subroutine set_drive
 
 end module gravier_scene_boundaries

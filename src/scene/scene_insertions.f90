@@ -47,7 +47,7 @@ contains
           if (allocated(error)) return
           allocate (insertion%unit_volume(size(insertion%shape)), source=0.0_dp)
           do k = 1, size(insertion%shape)
-            if (insertion%shape(k) > 0) insertion%unit_volume(k) = shapes%shape(insertion%shape(k))%volume
+            if (insertion%shape(k) > 0) insertion%unit_volume(k) = shapes%volume_of(insertion%shape(k))
           end do
         end if
         call check_room(config, i, insertion, error)

@@ -20,16 +20,13 @@ contains
     mean = scene%mean_radius
     if (.not. scene%effects%shapes) return
     do k = 1, scene%grains%n
-      half(k) = scene%grains%radius(k)
-      if (scene%grains%shape(k) > 0) half(k) = half(k)*scene%shapes%shape(scene%grains%shape(k))%half_thickness
+      half(k) = scene%grains%radius(k)*scene%shapes%half_thickness_of(scene%grains%shape(k))
     end do
     if (scene%n_grains > 0) mean = comm%sum_real(half)/real(scene%n_grains, dp)
     do p = 1, size(scene%insertions)
       if (.not. allocated(scene%insertions(p)%shape)) cycle
       do k = 1, size(scene%insertions(p)%shape)
-        entering = scene%insertions(p)%radii%moment(1)
-        if (scene%insertions(p)%shape(k) > 0) entering = entering* &
-          & scene%shapes%shape(scene%insertions(p)%shape(k))%half_thickness
+        entering = scene%insertions(p)%radii%moment(1)*scene%shapes%half_thickness_of(scene%insertions(p)%shape(k))
         mean = min(mean, entering)
       end do
     end do

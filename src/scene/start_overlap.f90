@@ -93,8 +93,7 @@ contains
     logical :: has_points
     integer :: i, j
 
-    i = view%list%candidate(p)
-    j = view%list%antagonist(p)
+    call view%find_ends(p, i, j)
     associate (bodies => view%bodies, decomposition => simulation%decomposition)
       overlap%id(1) = bodies%id(i)
       has_points = decomposition%no > 0

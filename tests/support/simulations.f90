@@ -7,7 +7,7 @@ module gravier_test_simulations
   use gravier_text, only: to_text
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_config, only: config_t, parse_config
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_test_contact_columns, only: same_contacts
@@ -62,7 +62,7 @@ contains
     do s = 1, size(sim%problem%sub)
       associate (sub => sim%problem%sub(s))
         do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             sub%v_free(d, b) = 2*hash_uniform(3, sub%id(b), d) - 1.0_dp
           end do
         end do

@@ -45,9 +45,25 @@ module gravier_given_contacts
     !> (dimension, n): of the tangential spring, the way of the candidate against the antagonist along the axes of space [m]; not
     !> allocated where the file has none
     real(dp), allocatable :: elongation(:, :)
+  contains
+    procedure :: rename_boundary => given_contacts_rename_boundary
   end type given_contacts_t
 
 contains
+
+  !> Give a boundary another name, if contacts have it.
+  subroutine given_contacts_rename_boundary(self, name, new)
+    class(given_contacts_t), intent(inout) :: self
+    character(len=*), intent(in) :: name
+    !> cut to the length of names
+    character(len=*), intent(in) :: new
+    integer :: k
+
+    if (.not. allocated(self%boundary)) return
+    do k = 1, size(self%boundary)
+      if (self%boundary(k) == name) self%boundary(k) = new(:min(len(new), name_length))
+    end do
+  end subroutine given_contacts_rename_boundary
 
   !> Refuse identifiers and numbers that are none of a contact, and make normals unit vectors. Errors are the same on all ranks.
   !> Collective.

@@ -31,6 +31,8 @@ module gravier_shape_library
     real(dp) :: size = 1.0_dp
     !> in 3D, the unit quaternion that turns these axes to where they lie in those of the file; its real part comes first
     real(dp) :: turn(4) = [1.0_dp, 0.0_dp, 0.0_dp, 0.0_dp]
+  contains
+    procedure :: least_rounding => body_shape_least_rounding
   end type body_shape_t
 
   !> In how many points bodies may touch.
@@ -52,11 +54,50 @@ module gravier_shape_library
   contains
     procedure :: add => shape_library_add
     procedure :: find => shape_library_find
+    procedure :: n_pieces => shape_library_n_pieces
+    procedure :: volume_of => shape_library_volume_of
+    procedure :: half_thickness_of => shape_library_half_thickness_of
     procedure :: inertia => shape_library_inertia
     procedure :: keep_round => shape_library_keep_round
   end type shape_library_t
 
 contains
+
+  !> Pieces of the shape of a number; a disk or a sphere is one.
+  pure integer function shape_library_n_pieces(self, number) result(n_pieces)
+    class(shape_library_t), intent(in) :: self
+    integer, intent(in) :: number
+
+    n_pieces = 1
+    if (number > 0) n_pieces = size(self%shape(number)%piece)
+  end function shape_library_n_pieces
+
+  !> Volume, area in 2D, of a body of radius 1 of the shape of a number above 0.
+  pure real(dp) function shape_library_volume_of(self, number) result(volume)
+    class(shape_library_t), intent(in) :: self
+    integer, intent(in) :: number
+    volume = self%shape(number)%volume
+  end function shape_library_volume_of
+
+  !> Half of the thickness of a body of radius 1 of the shape of a number where it is thinnest; 1 of disks and spheres.
+  pure real(dp) function shape_library_half_thickness_of(self, number) result(half)
+    class(shape_library_t), intent(in) :: self
+    integer, intent(in) :: number
+
+    half = 1.0_dp
+    if (number > 0) half = self%shape(number)%half_thickness
+  end function shape_library_half_thickness_of
+
+  !> The least rounding of its pieces with edges or corners; huge without any [radii].
+  pure real(dp) function body_shape_least_rounding(self) result(least)
+    class(body_shape_t), intent(in) :: self
+    integer :: p
+
+    least = huge(1.0_dp)
+    do p = 1, size(self%piece)
+      if (size(self%piece(p)%vertex, 2) > 1) least = min(least, self%piece(p)%rounding)
+    end do
+  end function body_shape_least_rounding
 
   !> Let flat sides end where their round corners begin, whatever they lie on. Springs of contacts need it: a point of contact that
   !> goes from a round corner out to a sharp one as a side turns changes the gap though no body moves there, and gives energy or

@@ -37,8 +37,8 @@ contains
     if (shapes%n == 0) return
     allocate (self%volume(shapes%n), self%half_thickness(shapes%n), self%principal(3, shapes%n))
     do k = 1, shapes%n
-      self%volume(k) = shapes%shape(k)%volume
-      self%half_thickness(k) = shapes%shape(k)%half_thickness
+      self%volume(k) = shapes%volume_of(k)
+      self%half_thickness(k) = shapes%half_thickness_of(k)
       self%principal(:, k) = shapes%shape(k)%inertia/maxval(shapes%shape(k)%inertia)
     end do
   end subroutine body_figures_init

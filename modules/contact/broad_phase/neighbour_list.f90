@@ -55,6 +55,9 @@ module gravier_neighbour_list
     procedure :: finish => neighbour_list_finish
     procedure :: points_of => neighbour_list_points_of
     procedure :: begins => neighbour_list_begins
+    procedure :: same_bodies => neighbour_list_same_bodies
+    procedure :: law_state => neighbour_list_law_state
+    procedure :: set_law_state => neighbour_list_set_law_state
     procedure :: keeps => neighbour_list_keeps
     procedure :: drop => neighbour_list_drop
     procedure :: n_watched => neighbour_list_n_watched
@@ -77,6 +80,29 @@ contains
     class(pair_memory_t), intent(in) :: self
     n = self%n_impulse + self%n_spring + self%n_states()
   end function pair_memory_words
+
+  !> Whether two places are of the same bodies.
+  pure logical function neighbour_list_same_bodies(self, p, q) result(same)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p, q
+    same = self%candidate(p) == self%candidate(q) .and. self%antagonist(p) == self%antagonist(q)
+  end function neighbour_list_same_bodies
+
+  !> What the law of pair `p` remembers; 0 where no law does.
+  pure integer function neighbour_list_law_state(self, p) result(state)
+    class(neighbour_list_t), intent(in) :: self
+    integer, intent(in) :: p
+
+    state = 0
+    if (self%memory%law_row > 0) state = self%state(self%memory%law_row, p)
+  end function neighbour_list_law_state
+
+  !> Let the law of pair `p` remember, where some law does.
+  pure subroutine neighbour_list_set_law_state(self, p, state)
+    class(neighbour_list_t), intent(inout) :: self
+    integer, intent(in) :: p, state
+    if (self%memory%law_row > 0) self%state(self%memory%law_row, p) = state
+  end subroutine neighbour_list_set_law_state
 
   !> Whether pair `p` keeps something from the last step.
   pure logical function neighbour_list_keeps(self, p) result(keeps)

@@ -42,6 +42,7 @@ module gravier_decomposition
     procedure :: init => decomposition_init
     procedure :: migrate => decomposition_migrate
     procedure :: deliver => decomposition_deliver
+    procedure :: alert_distance => decomposition_alert_distance
     procedure :: find_near => decomposition_find_near
     procedure :: unpack_by_subdomain => decomposition_unpack_by_subdomain
     procedure :: bounding_box => decomposition_bounding_box
@@ -53,6 +54,12 @@ module gravier_decomposition
   end type decomposition_t
 
 contains
+
+  !> Gap within which a pair is a contact [m].
+  pure real(dp) function decomposition_alert_distance(self) result(distance)
+    class(decomposition_t), intent(in) :: self
+    distance = self%rule%alert_distance
+  end function decomposition_alert_distance
 
   !> Make room for `n_subdomains`, without grains.
   subroutine decomposition_init(self, comm, n_subdomains, layout, period)

@@ -29,6 +29,10 @@ module gravier_halo
     integer :: n_resting = 0
     !> the cell as it is, for the velocities of images; set where it moves
     type(period_t) :: period
+  contains
+    procedure :: n_bodies => local_bodies_n_bodies
+    procedure :: find_ends => local_bodies_find_ends
+    procedure :: find_way => local_bodies_find_way
   end type local_bodies_t
 
   !> One of each body of a set, of those that stay.
@@ -68,6 +72,37 @@ module gravier_halo
   end type halo_t
 
 contains
+
+  !> Bodies that a subdomain sees.
+  pure integer function local_bodies_n_bodies(self) result(n_bodies)
+    class(local_bodies_t), intent(in) :: self
+    n_bodies = self%bodies%n
+  end function local_bodies_n_bodies
+
+  !> The bodies of a near pair: places of candidate and antagonist, or minus the number of a boundary as the antagonist.
+  pure subroutine local_bodies_find_ends(self, p, i, j)
+    class(local_bodies_t), intent(in) :: self
+    !> place of the pair in the list
+    integer, intent(in) :: p
+    integer, intent(out) :: i, j
+
+    i = self%list%candidate(p)
+    j = self%list%antagonist(p)
+  end subroutine local_bodies_find_ends
+
+  !> Way from the candidate of a near pair to the centre of its antagonist, or of the image of it that the candidate meets. The
+  !> antagonist is a grain.
+  pure subroutine local_bodies_find_way(self, p, period, way)
+    class(local_bodies_t), intent(in) :: self
+    !> place of the pair in the list
+    integer, intent(in) :: p
+    type(period_t), intent(in) :: period
+    !> (nd) [m]
+    real(dp), intent(out) :: way(:)
+
+    way(:) = self%bodies%position(:, self%list%antagonist(p)) - self%bodies%position(:, self%list%candidate(p))
+    if (size(self%list%shift) > 0) call period%add_shift(self%list%shift(p), 1, way)
+  end subroutine local_bodies_find_way
 
   !> Make the local bodies and lists from the grains as they have migrated. Collective.
   subroutine halo_build(self, decomposition, least_extent)

@@ -5,9 +5,10 @@ module gravier_interface
   use gravier_sorting, only: argsort, argsort_rows, find_sorted
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_shared_exchange, only: shared_part_t
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: interface_statistics_t, find_interface, count_figures, n_multiplicities
@@ -88,11 +89,11 @@ contains
     call answer_sharers(decomposition, received, answers, destination)
     call sparse_exchange(decomposition%comm, answers, destination, received)
     allocate (part(size(problem%sub)))
-    call sort_out_sharers(received, decomposition, columns, problem, part)
+    call sort_out_sharers(received, decomposition, columns, problem%sub, part)
     do s = 1, size(part)
       call number_shared_first(problem%sub(s), part(s)%body(1:part(s)%n_shared))
     end do
-    call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%kernels%nv)
+    call problem%shared%init(decomposition%comm, part, decomposition%n_subdomains, problem%nv)
   end subroutine find_interface
 
   subroutine columns_init(self, sub, n_home)
@@ -203,12 +204,12 @@ contains
   end subroutine answer_sharers
 
   !> Write the sharers of each subdomain of this rank into its part of the exchange, by ascending identifier.
-  subroutine sort_out_sharers(received, decomposition, columns, problem, part)
+  subroutine sort_out_sharers(received, decomposition, columns, sub, part)
     !> (subdomain told, body, sharer)
     integer(i8), intent(in), contiguous :: received(:, :)
     type(decomposition_t), intent(in) :: decomposition
     type(columns_t), intent(in) :: columns(:)
-    type(contact_problem_t), intent(inout) :: problem
+    type(subproblem_t), intent(inout) :: sub(:)
     type(shared_part_t), intent(inout) :: part(:)
     integer, allocatable :: order(:)
     integer :: s, k, last
@@ -219,12 +220,12 @@ contains
     do s = 1, size(part)
       last = k - 1
       do while (last < size(order))
-        if (received(1, order(last + 1)) /= problem%sub(s)%subdomain) exit
+        if (received(1, order(last + 1)) /= sub(s)%subdomain) exit
         last = last + 1
       end do
-      part(s)%subdomain = problem%sub(s)%subdomain
+      part(s)%subdomain = sub(s)%subdomain
       associate (owned => decomposition%owned(s))
-        call fill_part(received, order(k:last), owned%id(1:owned%n), columns(s), problem%sub(s), part(s))
+        call fill_part(received, order(k:last), owned%id(1:owned%n), columns(s), sub(s), part(s))
       end associate
       k = last + 1
     end do
@@ -293,7 +294,7 @@ contains
       sub%pair(1, c) = number(sub%pair(1, c))
       sub%pair(2, c) = number(sub%pair(2, c))
     end do
-    call reorder_grains(sub, grain)
+    call sub%reorder_grains(grain)
 
   contains
 
@@ -307,54 +308,11 @@ contains
 
   end subroutine number_shared_first
 
-  !> Bring what is known of the grains into another order; columns of boundaries stay.
-  subroutine reorder_grains(sub, grain)
-    type(subproblem_t), intent(inout) :: sub
-    !> number so far of each grain
-    integer, intent(in), contiguous :: grain(:)
-    type(subproblem_t) :: old
-    integer :: n, b
-
-    call move_alloc(sub%id, old%id)
-    call move_alloc(sub%owner, old%owner)
-    call move_alloc(sub%place, old%place)
-    call move_alloc(sub%multiplicity, old%multiplicity)
-    call move_alloc(sub%radius, old%radius)
-    call move_alloc(sub%volume, old%volume)
-    call move_alloc(sub%applied, old%applied)
-    call move_alloc(sub%v_free, old%v_free)
-    call move_alloc(sub%inverse_mass, old%inverse_mass)
-    call move_alloc(sub%cell%place, old%cell%place)
-    allocate (sub%id, source=old%id)
-    allocate (sub%owner, source=old%owner)
-    allocate (sub%place, mold=old%place)
-    allocate (sub%multiplicity, source=old%multiplicity)
-    allocate (sub%radius, mold=old%radius)
-    if (allocated(old%volume)) allocate (sub%volume, mold=old%volume)
-    if (allocated(old%applied)) allocate (sub%applied, mold=old%applied)
-    allocate (sub%v_free, source=old%v_free)
-    allocate (sub%inverse_mass, source=old%inverse_mass)
-    if (allocated(old%cell%place)) allocate (sub%cell%place, mold=old%cell%place)
-    do n = 1, sub%n_grains
-      b = grain(n)
-      sub%id(n) = old%id(b)
-      sub%owner(n) = old%owner(b)
-      sub%place(n) = old%place(b)
-      sub%multiplicity(n) = old%multiplicity(b)
-      sub%radius(n) = old%radius(b)
-      if (allocated(old%volume)) sub%volume(n) = old%volume(b)
-      if (allocated(old%applied)) sub%applied(:, n) = old%applied(:, b)
-      sub%v_free(:, n) = old%v_free(:, b)
-      sub%inverse_mass(:, n) = old%inverse_mass(:, b)
-      if (allocated(old%cell%place)) sub%cell%place(:, n) = old%cell%place(:, b)
-    end do
-  end subroutine reorder_grains
-
   !> Count the contacts of all subdomains, and the interface. Each body is counted in the first of the subdomains that share it.
   !> Collective.
-  subroutine count_figures(decomposition, halo, problem, figures)
+  subroutine count_figures(decomposition, views, problem, figures)
     type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     type(contact_problem_t), intent(inout) :: problem
     type(interface_statistics_t), intent(out) :: figures
     integer(i8) :: counts(n_multiplicities + 8)
@@ -383,7 +341,7 @@ contains
         extremes(2) = max(extremes(2), -real(sub%n_contacts, dp))
         counts(n_multiplicities + 3) = counts(n_multiplicities + 3) + size(part%neighbour)
         counts(n_multiplicities + 4) = counts(n_multiplicities + 4) + int(part%n_slots, i8)*problem%shared%width
-        counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(halo%view(s)%origin == 0)
+        counts(n_multiplicities + 5) = counts(n_multiplicities + 5) + count(views(s)%origin == 0)
         extremes(3) = max(extremes(3), real(size(part%neighbour), dp))
         extremes(4) = max(extremes(4), real(part%n_slots, dp)*problem%shared%width)
         counts(n_multiplicities + 6) = counts(n_multiplicities + 6) + sub%overlapping_cores

@@ -11,6 +11,9 @@ module gravier_nscdd_ep
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve, phase_factorise
   use gravier_body_mass, only: subtract_inverse_mass
+  use gravier_contact_kernels, only: kernels_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t, default_on_active
@@ -83,7 +86,7 @@ contains
     call self%nscdd_t%held(nc, nv, held)
     call self%matrix%held(nc, nv, held)
     call held%add("impulses of the safeguard of l", .true., 8, nc)
-    if (.not. self%matrix%direction%active_only) return
+    if (.not. self%matrix%on_active_only()) return
     call held%add("impulses fed back", .true., 8, nc)
     call held%add("velocities fed back", .false., 8, nv)
   end subroutine nscdd_ep_held
@@ -98,9 +101,9 @@ contains
     call self%matrix%set_factor(1.0_dp)
     self%guarded = is_enriched(self)
     if (.not. is_enriched(self)) return
-    call make_field(problem, self%change)
-    call make_field(problem, self%b)
-    if (self%matrix%direction%active_only) call self%feedback%start(problem)
+    call make_field(problem%shared, self%change)
+    call make_field(problem%shared, self%b)
+    if (self%matrix%on_active_only()) call self%feedback%start(problem)
     call self%guard%start(problem)
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)
@@ -109,7 +112,7 @@ contains
 
   pure logical function is_enriched(self)
     class(nscdd_ep_t), intent(in) :: self
-    is_enriched = self%matrix%direction%value*self%matrix%factor > 0.0_dp
+    is_enriched = self%matrix%is_enriched()
   end function is_enriched
 
   subroutine nscdd_ep_iterate(self, problem, measure, jump, error)
@@ -128,7 +131,7 @@ contains
     end if
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
-    if (self%matrix%direction%active_only) then
+    if (self%matrix%on_active_only()) then
       call start_timer(phase_exchange)
       call average_copies(problem)
       call stop_timer(phase_exchange)
@@ -177,51 +180,54 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      if (self%matrix%direction%active_only) then
-        call self%matrix%enrich(problem, s, error)
+      if (self%matrix%on_active_only()) then
+        call self%matrix%enrich(problem%kernels, problem%sub(s), s, error)
         call self%feedback%keep_lead(s, self%matrix)
       else
-        call enriched_velocities(self, problem, s, error)
+        call enriched_velocities(self, problem%kernels, problem%sub(s), s, error)
       end if
       self%change(s)%upper(:, :) = 0.0_dp
       self%change(s)%lower(:, :) = 0.0_dp
     end do
-    call chain_differences(problem, self%matrix, self%b)
+    call chain_differences(problem%shared, self%matrix, self%b)
     call problem%comm%agree(error)
     if (allocated(error)) return
     call self%interface_solver%solve(problem, self%matrix, self%b, self%change, error)
     if (allocated(error)) return
-    if (self%matrix%direction%active_only) then
+    if (self%matrix%on_active_only()) then
       call self%feedback%take(problem, self%matrix, self%change, error)
     else
       do s = 1, size(problem%sub)
-        call take_multipliers(self, problem, s)
+        call take_multipliers(problem%shared, s, self%change(s), problem%sub(s))
       end do
     end if
   end subroutine solve_interface
 
   !> V_E + M_eta,E^-1 H_E l_E (v_E - H_E^T V_E), into body_work.
-  subroutine enriched_velocities(self, problem, s, error)
+  subroutine enriched_velocities(self, kernels, sub, s, error)
     class(nscdd_ep_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> its place on this rank
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
 
-    call self%matrix%enrich(problem, s, error)
+    call self%matrix%enrich(kernels, sub, s, error)
     associate (work => self%matrix%part(s)%body_work)
-      work(:, :) = work + problem%sub(s)%velocity
+      work(:, :) = work + sub%velocity
     end associate
   end subroutine enriched_velocities
 
   !> V_E changes by - M~_E^-1 A_E^T (F_new - F).
-  subroutine take_multipliers(self, problem, s)
-    class(nscdd_ep_t), intent(in) :: self
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine take_multipliers(shared, s, change, sub)
+    type(shared_exchange_t), intent(in) :: shared
     integer, intent(in) :: s
-    real(dp) :: load(problem%kernels%nv)
+    type(interface_field_t), intent(in) :: change
+    type(subproblem_t), intent(inout) :: sub
+    real(dp) :: load(shared%width)
     integer :: k, b
 
-    associate (part => problem%shared%part(s), sub => problem%sub(s), change => self%change(s))
+    associate (part => shared%part(s))
       do k = 1, part%n_shared
         b = part%body(k)
         load(:) = change%upper(:, k) - change%lower(:, k)

@@ -10,7 +10,8 @@ module gravier_enriched_matrix
   use gravier_contact_kernels, only: kernels_t, contact_jacobian, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: mass_column
   use gravier_contact_operator, only: find_local_operator
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method_options, only: held_list_t
   use gravier_method, only: method_t, begin_sweeps, sweep_once, end_sweeps
   use gravier_sparse_direct, only: sparse_factor_t
@@ -40,6 +41,8 @@ module gravier_enriched_matrix
     logical :: general = .false.
     type(enriched_part_t), allocatable :: part(:)
   contains
+    procedure :: is_enriched => enriched_matrix_is_enriched
+    procedure :: on_active_only => enriched_matrix_on_active_only
     procedure :: set_factor => enriched_matrix_set_factor
     procedure :: count_use => enriched_matrix_count_use
     procedure, nopass :: held => enriched_matrix_held
@@ -63,6 +66,18 @@ contains
     call held%add("enriched matrix, without factors", .true., 8, 3*nc)
     call held%add("right-hand side of the enriched matrix", .false., 8, nv)
   end subroutine enriched_matrix_held
+
+  !> Whether l is more than 0.
+  pure logical function enriched_matrix_is_enriched(self) result(is_enriched)
+    class(enriched_matrix_t), intent(in) :: self
+    is_enriched = self%direction%value*self%factor > 0.0_dp
+  end function enriched_matrix_is_enriched
+
+  !> Whether l is 0 on contacts that are not active.
+  pure logical function enriched_matrix_on_active_only(self) result(on_active_only)
+    class(enriched_matrix_t), intent(in) :: self
+    on_active_only = self%direction%active_only
+  end function enriched_matrix_on_active_only
 
   !> Make ready for a new problem. Factors of the last problem are kept, in case the matrices are the same.
   subroutine enriched_matrix_start(self, problem, error)
@@ -138,7 +153,7 @@ contains
         call make_diagonal_blocks(part%direction, sub%n_contacts, block)
         call assemble(problem%kernels, sub, block, .false., entries)
         before = part%factor%factorisations
-        call part%factor%factorise(sub%n_bodies*problem%kernels%nv, entries%row, entries%column, entries%value, error)
+        call part%factor%factorise(sub%n_bodies*problem%nv, entries%row, entries%column, entries%value, error)
         changed = changed .or. part%factor%factorisations > before
       end associate
     end do
@@ -189,20 +204,21 @@ contains
     end do
   end subroutine drop_inactive
 
-  !> Factorise M + H l H^T of subdomain `s` with any blocks l.
-  subroutine enriched_matrix_factorise_blocks(self, problem, s, block, error)
+  !> Factorise M + H l H^T of a subdomain with any blocks l.
+  subroutine enriched_matrix_factorise_blocks(self, kernels, sub, s, block, error)
     class(enriched_matrix_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> its place on this rank
     integer, intent(in) :: s
     !> (nc, nc, contacts) [kg]
     real(dp), intent(in), contiguous :: block(:, :, :)
     type(error_t), allocatable, intent(inout) :: error
     type(entries_t) :: entries
 
-    if (problem%sub(s)%n_bodies == 0) return
-    call assemble(problem%kernels, problem%sub(s), block, self%general, entries)
-    call self%part(s)%factor%factorise(problem%sub(s)%n_bodies*problem%kernels%nv, entries%row, entries%column, &
-      & entries%value, error)
+    if (sub%n_bodies == 0) return
+    call assemble(kernels, sub, block, self%general, entries)
+    call self%part(s)%factor%factorise(sub%n_bodies*kernels%nv, entries%row, entries%column, entries%value, error)
   end subroutine enriched_matrix_factorise_blocks
 
   !> The blocks (nc, nc, contacts) of an l without coupling.
@@ -288,10 +304,11 @@ contains
 
   end subroutine assemble
 
-  !> Solve (M + H l H^T) y = b in subdomain `s`, in place; what cannot move has no velocity, walls among it.
-  subroutine enriched_matrix_solve(self, problem, s, b, error)
+  !> Solve (M + H l H^T) y = b in a subdomain, in place; what cannot move has no velocity, walls among it.
+  subroutine enriched_matrix_solve(self, sub, s, b, error)
     class(enriched_matrix_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(subproblem_t), intent(in) :: sub
+    !> its place on this rank
     integer, intent(in) :: s
     !> (nv, n_columns) [N s, N m s] in, [m/s, rad/s] out
     real(dp), intent(inout), contiguous :: b(:, :)
@@ -299,35 +316,37 @@ contains
     real(dp), allocatable :: flat(:, :)
     integer :: k, d, nv
 
-    nv = problem%kernels%nv
-    allocate (flat(nv*problem%sub(s)%n_bodies, 1))
-    do k = 1, problem%sub(s)%n_bodies
+    nv = size(b, 1)
+    allocate (flat(nv*sub%n_bodies, 1))
+    do k = 1, sub%n_bodies
       flat((k - 1)*nv + 1:k*nv, 1) = b(:, k)
     end do
     if (size(flat) > 0) call self%part(s)%factor%solve(flat, error)
-    do k = 1, problem%sub(s)%n_bodies
+    do k = 1, sub%n_bodies
       do d = 1, nv
-        b(d, k) = merge(flat((k - 1)*nv + d, 1), 0.0_dp, problem%sub(s)%moves(d, k))
+        b(d, k) = merge(flat((k - 1)*nv + d, 1), 0.0_dp, sub%moves(d, k))
       end do
     end do
-    b(:, problem%sub(s)%n_bodies + 1:) = 0.0_dp
+    b(:, sub%n_bodies + 1:) = 0.0_dp
   end subroutine enriched_matrix_solve
 
-  !> (M + H l H^T)^-1 H l (v - H^T V) of subdomain `s`, into body_work: v is the velocity that solved the law at each
+  !> (M + H l H^T)^-1 H l (v - H^T V) of a subdomain, into body_work: v is the velocity that solved the law at each
   !> contact's last update, V the present velocity of the bodies. It vanishes when the two agree.
-  subroutine enriched_matrix_enrich(self, problem, s, error)
+  subroutine enriched_matrix_enrich(self, kernels, sub, s, error)
     class(enriched_matrix_t), intent(inout) :: self
-    type(contact_problem_t), intent(in) :: problem
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> its place on this rank
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
 
-    associate (part => self%part(s), sub => problem%sub(s))
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, part%contact_work)
+    associate (part => self%part(s))
+      call sub%contact_velocity(kernels, sub%velocity, part%contact_work)
       part%contact_work(:, :, :) = part%direction*(part%law_velocity - part%contact_work)
-      if (self%direction%active_only) call drop_inactive(problem%kernels, sub, part%contact_work)
+      if (self%direction%active_only) call drop_inactive(kernels, sub, part%contact_work)
       part%body_work(:, :) = 0.0_dp
-      call problem%kernels%add_reaction(sub%pair, sub%hot, part%contact_work, part%body_work)
-      call self%solve(problem, s, part%body_work, error)
+      call sub%add_reaction(kernels, part%contact_work, part%body_work)
+      call self%solve(sub, s, part%body_work, error)
     end associate
   end subroutine enriched_matrix_enrich
 

@@ -11,7 +11,8 @@ module gravier_impulse_feedback
   use gravier_errors, only: error_t
   use gravier_contact_kernels, only: kernels_t, project_on_cones
   use gravier_body_mass, only: apply_inverse_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_enriched_matrix, only: enriched_matrix_t, drop_inactive
   use gravier_interface_problem, only: interface_field_t, load_transpose
   implicit none
@@ -72,18 +73,17 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      call load_transpose(problem, s, multipliers(s), matrix)
-      call matrix%solve(problem, s, matrix%part(s)%body_work, error)
+      call load_transpose(problem%shared, s, multipliers(s), matrix)
+      call matrix%solve(problem%sub(s), s, matrix%part(s)%body_work, error)
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
         part%lead(:, :) = sub%velocity + part%lead - matrix%part(s)%body_work
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, part%lead, work)
+        call sub%contact_velocity(problem%kernels, part%lead, work)
         work(:, :, :) = matrix%part(s)%direction*(matrix%part(s)%law_velocity - work)
         call drop_inactive(problem%kernels, sub, work)
         part%step(:, :, :) = sub%impulse + work
         call project_on_cones(problem%kernels, sub%n_contacts, sub%hot, part%step)
         part%step(:, :, :) = part%step - sub%impulse
-        sub%reaction(:, :) = 0.0_dp
-        call problem%kernels%add_reaction(sub%pair, sub%hot, part%step, sub%reaction)
+        call sub%react_to(problem%kernels, part%step)
         call problem%shared%load(s, sub%reaction)
       end associate
     end do
@@ -94,14 +94,14 @@ contains
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
       call velocity_change(problem%sub(s), self%part(s)%lead)
       associate (part => self%part(s), sub => problem%sub(s), work => matrix%part(s)%contact_work)
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%velocity, work)
-        work(:, 1, :) = work(:, 1, :) + sub%hot(:, problem%kernels%nd + 1, :)
-        associate (row => problem%kernels%shift_row, nf => problem%kernels%nf)
+        call sub%contact_velocity(problem%kernels, sub%velocity, work)
+        work(:, 1, :) = work(:, 1, :) + sub%hot(:, problem%nd + 1, :)
+        associate (row => problem%shift_row, nf => problem%nf)
           if (row > 0) work(:, 2:nf, :) = work(:, 2:nf, :) + sub%hot(:, row + 1:row + nf - 1, :)
         end associate
         call add_compliance(problem%kernels, sub, sub%impulse, work)
         parts(1, s) = sum(part%step*work)
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, part%lead, work)
+        call sub%contact_velocity(problem%kernels, part%lead, work)
         call add_compliance(problem%kernels, sub, part%step, work)
         parts(2, s) = sum(part%step*work)
       end associate
@@ -111,7 +111,7 @@ contains
     if (sums(1) < 0.0_dp) self%share = min(1.0_dp, -sums(1)/max(sums(2), -sums(1)))
     do s = 1, size(problem%sub)
       associate (part => self%part(s), sub => problem%sub(s))
-        sub%impulse(:, :, :) = sub%impulse + self%share*part%step
+        call sub%add_impulses(self%share, part%step)
         sub%velocity(:, :) = sub%velocity + self%share*part%lead
       end associate
     end do
@@ -126,7 +126,7 @@ contains
     real(dp), intent(inout), contiguous :: velocity(:, :, :)
     integer :: d
 
-    if (kernels%row%compliance_n == 0) return
+    if (.not. kernels%has_compliance()) return
     velocity(:, 1, :) = velocity(:, 1, :) + sub%hot(:, kernels%row%compliance_n, :)*impulse(:, 1, :)
     do d = 2, kernels%nf
       velocity(:, d, :) = velocity(:, d, :) + sub%hot(:, kernels%row%compliance_t, :)*impulse(:, d, :)

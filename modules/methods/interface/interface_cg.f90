@@ -6,6 +6,8 @@ module gravier_interface_cg
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t, raise, status_failure
   use gravier_text, only: to_text
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_interface_problem, only: interface_field_t, interface_solver_t, make_field, chain_differences, load_transpose, &
@@ -48,14 +50,14 @@ contains
     real(dp) :: bound, rz, rz_old, step
     integer :: k
 
-    call make_field(problem, r)
-    call make_field(problem, z)
-    call make_field(problem, xp)
-    call precondition(problem, b, z)
+    call make_field(problem%shared, r)
+    call make_field(problem%shared, z)
+    call make_field(problem%shared, xp)
+    call precondition(problem%sub, problem%shared, b, z)
     bound = self%tolerance**2*dot_field(problem, b, z)
     call apply(problem, matrix, f, xp, error)
     call combine(r, b, -1.0_dp, xp)
-    call precondition(problem, r, z)
+    call precondition(problem%sub, problem%shared, r, z)
     p = z
     rz = dot_field(problem, r, z)
     do k = 1, self%max_iterations
@@ -64,7 +66,7 @@ contains
       step = rz/dot_field(problem, p, xp)
       call combine(f, f, step, p)
       call combine(r, r, -step, xp)
-      call precondition(problem, r, z)
+      call precondition(problem%sub, problem%shared, r, z)
       rz_old = rz
       rz = dot_field(problem, r, z)
       call combine(p, z, rz/rz_old, p)
@@ -75,19 +77,20 @@ contains
   end subroutine interface_cg_solve
 
   !> z := r divided by the diagonal of X for l = 0; zero, as r is, for a component that cannot move.
-  subroutine precondition(problem, r, z)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine precondition(sub, shared, r, z)
+    type(subproblem_t), intent(in) :: sub(:)
+    type(shared_exchange_t), intent(in) :: shared
     type(interface_field_t), intent(in) :: r(:)
     type(interface_field_t), intent(inout) :: z(:)
     integer :: s, k
 
     do s = 1, size(r)
-      associate (sub => problem%sub(s), part => problem%shared%part(s))
+      associate (part => shared%part(s))
         do k = 1, part%n_shared
           z(s)%upper(:, k) = 0.5_dp*r(s)%upper(:, k)
           z(s)%lower(:, k) = 0.5_dp*r(s)%lower(:, k)
-          call sub%multiply_mass(part%body(k), z(s)%upper(:, k))
-          call sub%multiply_mass(part%body(k), z(s)%lower(:, k))
+          call sub(s)%multiply_mass(part%body(k), z(s)%upper(:, k))
+          call sub(s)%multiply_mass(part%body(k), z(s)%lower(:, k))
         end do
       end associate
     end do
@@ -103,10 +106,10 @@ contains
     integer :: s
 
     do s = 1, size(f)
-      call load_transpose(problem, s, f(s), matrix)
-      call matrix%solve(problem, s, matrix%part(s)%body_work, error)
+      call load_transpose(problem%shared, s, f(s), matrix)
+      call matrix%solve(problem%sub(s), s, matrix%part(s)%body_work, error)
     end do
-    call chain_differences(problem, matrix, xf)
+    call chain_differences(problem%shared, matrix, xf)
     call problem%comm%agree(error)
   end subroutine apply
 

@@ -9,6 +9,8 @@ module gravier_interface_direct
   use gravier_narrow, only: narrow
   use gravier_double_double, only: extended_product, extended_add
   use gravier_errors, only: error_t, raise, status_failure
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_sparse_direct, only: sparse_factor_t
@@ -33,8 +35,8 @@ module gravier_interface_direct
   type, extends(interface_solver_t) :: interface_direct_t
     type(sparse_factor_t) :: factor
     type(block_t), allocatable, private :: blocks(:)
-    !> unknowns of all ranks, and the first one of each rank (ranks + 1)
-    integer, private :: n = 0
+    !> unknowns of all ranks, of this rank and of the ranks before it, and the first one of each rank (ranks + 1)
+    integer, private :: n = 0, n_own = 0, before = 0
     integer, allocatable, private :: first_row(:)
   contains
     procedure :: prepare => interface_direct_prepare
@@ -60,51 +62,54 @@ contains
     integer :: s
 
     if (.not. self%factor%is_alive()) call self%factor%init_distributed(problem%comm, error, general=matrix%general)
-    call number_unknowns(self, problem, error)
+    call number_unknowns(self, problem%comm, problem%shared, error)
     if (self%n == 0 .or. allocated(error)) return
     do s = 1, size(self%blocks)
-      call find_compliance(problem, matrix, s, self%blocks(s)%compliance, error)
+      call find_compliance(problem%shared, problem%sub(s)%n_bodies, matrix, s, self%blocks(s)%compliance, error)
     end do
     call problem%comm%agree(error)
     if (allocated(error)) return
-    call assemble(self%blocks, problem%kernels%nv, matrix%general, row, column, value)
+    call assemble(self%blocks, problem%nv, matrix%general, row, column, value)
     call self%factor%factorise(self%n, row, column, value, error)
     call problem%comm%agree(error)
   end subroutine interface_direct_prepare
 
   !> Number the multipliers: those of a subdomain after those of the one before; a multiplier belongs to the lower of
   !> the two subdomains that it ties. Collective.
-  subroutine number_unknowns(self, problem, error)
+  subroutine number_unknowns(self, comm, shared, error)
     class(interface_direct_t), intent(inout) :: self
-    type(contact_problem_t), intent(inout) :: problem
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(inout) :: shared
     type(error_t), allocatable, intent(inout) :: error
     integer(i8), allocatable :: first(:)
     integer(i8) :: mine, next
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
+    nv = shared%width
     mine = 0
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s))
+    do s = 1, size(shared%part)
+      associate (part => shared%part(s))
         do k = 1, part%n_shared
           if (part%copy_rank(k) < part%multiplicity(k)) mine = mine + nv
         end do
       end associate
     end do
-    next = problem%comm%offset(mine) + 1
-    if (problem%comm%total(mine) > huge(0)) call raise(error, status_failure, &
+    next = comm%offset(mine) + 1
+    if (comm%total(mine) > huge(0)) call raise(error, status_failure, &
       & "the interface has more than 2^31 unknowns; choose interface = 'cg'")
     if (allocated(error)) return
-    self%n = narrow(problem%comm%total(mine))
-    allocate (first(problem%comm%size + 1), source=0_i8)
-    first(problem%comm%rank + 1) = next
-    call problem%comm%sum_counts(first)
-    first(problem%comm%size + 1) = self%n + 1
+    self%n = narrow(comm%total(mine))
+    allocate (first(comm%size + 1), source=0_i8)
+    first(comm%rank + 1) = next
+    call comm%sum_counts(first)
+    first(comm%size + 1) = self%n + 1
     self%first_row = narrow(first)
+    self%n_own = narrow(mine)
+    self%before = self%first_row(comm%rank + 1) - 1
     if (allocated(self%blocks)) deallocate (self%blocks)
-    allocate (self%blocks(size(problem%sub)))
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), block => self%blocks(s))
+    allocate (self%blocks(size(shared%part)))
+    do s = 1, size(shared%part)
+      associate (part => shared%part(s), block => self%blocks(s))
         allocate (block%upper(part%n_shared), block%lower(part%n_shared), source=0)
         do k = 1, part%n_shared
           if (part%copy_rank(k) == part%multiplicity(k)) cycle
@@ -116,9 +121,9 @@ contains
         end do
       end associate
     end do
-    call problem%shared%pass()
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), block => self%blocks(s))
+    call shared%pass()
+    do s = 1, size(shared%part)
+      associate (part => shared%part(s), block => self%blocks(s))
         do k = 1, part%n_shared
           at = part%first(k) + part%copy_rank(k) - 1
           if (at > part%first(k)) block%lower(k) = nint(part%recv(1, part%slot(at - 1)))
@@ -128,8 +133,10 @@ contains
   end subroutine number_unknowns
 
   !> Columns of M_eta,E^-1 of the shared bodies, at the shared bodies.
-  subroutine find_compliance(problem, matrix, s, compliance, error)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine find_compliance(shared, n_bodies, matrix, s, compliance, error)
+    type(shared_exchange_t), intent(in) :: shared
+    !> of the subdomain
+    integer, intent(in) :: n_bodies
     type(enriched_matrix_t), intent(inout) :: matrix
     integer, intent(in) :: s
     real(dp), allocatable, intent(out) :: compliance(:, :)
@@ -138,17 +145,19 @@ contains
     real(dp), allocatable :: columns(:, :)
     integer :: k, d, nv, from, width, j
 
-    nv = problem%kernels%nv
-    allocate (dof(nv*problem%shared%part(s)%n_shared))
-    do k = 1, problem%shared%part(s)%n_shared
-      do d = 1, nv
-        dof((k - 1)*nv + d) = (problem%shared%part(s)%body(k) - 1)*nv + d
+    nv = shared%width
+    allocate (dof(nv*shared%n_shared(s)))
+    associate (body => shared%part(s)%body)
+      do k = 1, size(dof)/nv
+        do d = 1, nv
+          dof((k - 1)*nv + d) = (body(k) - 1)*nv + d
+        end do
       end do
-    end do
+    end associate
     allocate (compliance(size(dof), size(dof)))
     do from = 1, size(dof), block_width
       width = min(block_width, size(dof) - from + 1)
-      allocate (columns(nv*problem%sub(s)%n_bodies, width), source=0.0_dp)
+      allocate (columns(nv*n_bodies, width), source=0.0_dp)
       do j = 1, width
         columns(dof(from + j - 1), j) = 1.0_dp
       end do
@@ -238,18 +247,18 @@ contains
       x(s)%lower_low = x(s)%upper
     end do
     r = b
-    allocate (rows(self%first_row(problem%comm%rank + 2) - self%first_row(problem%comm%rank + 1)))
+    allocate (rows(self%n_own))
     last = huge(1.0_dp)
     do k = 1, most_refinements
-      call gather_rows(self, problem, r, rows)
+      call gather_rows(self, r, rows)
       call self%factor%solve_rows(self%first_row, rows, error)
       call problem%comm%agree(error)
       if (allocated(error)) return
-      call add_rows(self, problem, rows, x, size_now)
+      call add_rows(self, problem%comm, problem%shared, rows, x, size_now)
       self%iterations = self%iterations + 1
       if (size_now(1) <= enough*size_now(2) .or. size_now(1) >= 0.5_dp*last) exit
       last = size_now(1)
-      call extended_residual(self, problem, b, x, r)
+      call extended_residual(self, problem%shared, b, x, r)
     end do
     do s = 1, size(f)
       f(s)%upper(:, :) = x(s)%upper
@@ -258,55 +267,55 @@ contains
   end subroutine interface_direct_solve
 
   !> The residual on the unknowns of this rank, in working precision.
-  subroutine gather_rows(self, problem, r, rows)
+  subroutine gather_rows(self, r, rows)
     class(interface_direct_t), intent(in) :: self
-    type(contact_problem_t), intent(in) :: problem
     type(interface_field_t), intent(in) :: r(:)
     real(dp), intent(inout), contiguous :: rows(:)
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
     do s = 1, size(r)
+      nv = size(r(s)%upper, 1)
       do k = 1, size(self%blocks(s)%upper)
         if (self%blocks(s)%upper(k) == 0) cycle
-        at = self%blocks(s)%upper(k) - self%first_row(problem%comm%rank + 1)
+        at = self%blocks(s)%upper(k) - self%before - 1
         rows(at + 1:at + nv) = r(s)%upper(:, k)
       end do
     end do
   end subroutine gather_rows
 
   !> Add a correction to x on both sides of each multiplier. Collective.
-  subroutine add_rows(self, problem, rows, x, size_now)
+  subroutine add_rows(self, comm, shared, rows, x, size_now)
     class(interface_direct_t), intent(in) :: self
-    type(contact_problem_t), intent(inout) :: problem
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(inout) :: shared
     real(dp), intent(in), contiguous :: rows(:)
     type(extended_field_t), intent(inout) :: x(:)
     !> largest entry of the correction and of x
     real(dp), intent(out) :: size_now(2)
     integer :: s, k, at, nv
 
-    nv = problem%kernels%nv
+    nv = shared%width
     size_now(:) = 0.0_dp
     do s = 1, size(x)
-      associate (part => problem%shared%part(s), block => self%blocks(s))
+      associate (part => shared%part(s), block => self%blocks(s))
         do k = 1, part%n_slots
           part%send(:, k) = 0.0_dp
           if (block%upper(part%slot_shared(k)) == 0) cycle
-          at = block%upper(part%slot_shared(k)) - self%first_row(problem%comm%rank + 1)
+          at = block%upper(part%slot_shared(k)) - self%before - 1
           part%send(:, k) = rows(at + 1:at + nv)
         end do
         do k = 1, part%n_shared
           if (block%upper(k) == 0) cycle
-          at = block%upper(k) - self%first_row(problem%comm%rank + 1)
+          at = block%upper(k) - self%before - 1
           call extended_add(x(s)%upper(:, k), x(s)%upper_low(:, k), rows(at + 1:at + nv))
           size_now(1) = max(size_now(1), maxval(abs(rows(at + 1:at + nv))))
           size_now(2) = max(size_now(2), maxval(abs(x(s)%upper(:, k))))
         end do
       end associate
     end do
-    call problem%shared%pass()
+    call shared%pass()
     do s = 1, size(x)
-      associate (part => problem%shared%part(s))
+      associate (part => shared%part(s))
         do k = 1, part%n_shared
           at = part%first(k) + part%copy_rank(k) - 1
           if (at > part%first(k)) &
@@ -314,13 +323,13 @@ contains
         end do
       end associate
     end do
-    call problem%comm%highest_of(size_now)
+    call comm%highest_of(size_now)
   end subroutine add_rows
 
   !> r := b - X x, computed in twice the working precision, on upper multipliers. Collective.
-  subroutine extended_residual(self, problem, b, x, r)
+  subroutine extended_residual(self, shared, b, x, r)
     class(interface_direct_t), intent(in) :: self
-    type(contact_problem_t), intent(inout) :: problem
+    type(shared_exchange_t), intent(inout) :: shared
     type(interface_field_t), intent(in) :: b(:)
     type(extended_field_t), intent(in) :: x(:)
     type(interface_field_t), intent(inout) :: r(:)
@@ -349,7 +358,7 @@ contains
       logical, intent(in) :: high
 
       do s = 1, size(x)
-        associate (part => problem%shared%part(s))
+        associate (part => shared%part(s))
           do k = 1, part%n_slots
             if (high) then
               part%send(:, k) = y(s)%lower(:, part%slot_shared(k))
@@ -359,9 +368,9 @@ contains
           end do
         end associate
       end do
-      call problem%shared%pass()
+      call shared%pass()
       do s = 1, size(x)
-        associate (part => problem%shared%part(s))
+        associate (part => shared%part(s))
           do k = 1, part%n_shared
             at = part%first(k) + part%copy_rank(k) - 1
             if (at < part%first(k + 1) - 1) &

@@ -6,6 +6,7 @@
 module gravier_interface_problem
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
+  use gravier_shared_exchange, only: shared_exchange_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   implicit none
@@ -61,31 +62,30 @@ module gravier_interface_problem
 contains
 
   !> A field of zeros.
-  subroutine make_field(problem, field)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine make_field(shared, field)
+    type(shared_exchange_t), intent(in) :: shared
     type(interface_field_t), allocatable, intent(out) :: field(:)
     integer :: s
 
-    allocate (field(size(problem%sub)))
+    allocate (field(size(shared%part)))
     do s = 1, size(field)
-      allocate (field(s)%upper(problem%kernels%nv, problem%shared%part(s)%n_shared), &
-        & field(s)%lower(problem%kernels%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
+      allocate (field(s)%upper(shared%width, shared%n_shared(s)), field(s)%lower(shared%width, shared%n_shared(s)), source=0.0_dp)
     end do
   end subroutine make_field
 
   !> sum_E A_E y_E of the body values in `body_work`: the difference of neighbours on each chain. Collective.
-  subroutine chain_differences(problem, matrix, field)
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine chain_differences(shared, matrix, field)
+    type(shared_exchange_t), intent(inout) :: shared
     type(enriched_matrix_t), intent(in) :: matrix
     type(interface_field_t), intent(inout) :: field(:)
     integer :: s, k, at
 
-    do s = 1, size(problem%sub)
-      call problem%shared%load(s, matrix%part(s)%body_work)
+    do s = 1, size(field)
+      call shared%load(s, matrix%part(s)%body_work)
     end do
-    call problem%shared%pass()
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), y => matrix%part(s)%body_work)
+    call shared%pass()
+    do s = 1, size(field)
+      associate (part => shared%part(s), y => matrix%part(s)%body_work)
         do k = 1, part%n_shared
           at = part%first(k) + part%copy_rank(k) - 1
           field(s)%upper(:, k) = 0.0_dp
@@ -98,17 +98,19 @@ contains
   end subroutine chain_differences
 
   !> body_work := A_E^T f.
-  subroutine load_transpose(problem, s, f, matrix)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine load_transpose(shared, s, f, matrix)
+    type(shared_exchange_t), intent(in) :: shared
     integer, intent(in) :: s
     type(interface_field_t), intent(in) :: f
     type(enriched_matrix_t), intent(inout) :: matrix
     integer :: k
 
-    matrix%part(s)%body_work(:, :) = 0.0_dp
-    do k = 1, problem%shared%part(s)%n_shared
-      matrix%part(s)%body_work(:, problem%shared%part(s)%body(k)) = f%upper(:, k) - f%lower(:, k)
-    end do
+    associate (part => shared%part(s))
+      matrix%part(s)%body_work(:, :) = 0.0_dp
+      do k = 1, part%n_shared
+        matrix%part(s)%body_work(:, part%body(k)) = f%upper(:, k) - f%lower(:, k)
+      end do
+    end associate
   end subroutine load_transpose
 
   !> Scalar product of two fields, each multiplier counted once. Collective.

@@ -10,8 +10,10 @@ module gravier_newton
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_factorise, phase_interface_solve, phase_check
-  use gravier_contact_kernels, only: project_on_cones
+  use gravier_contact_kernels, only: kernels_t
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   use gravier_method, only: work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
   use gravier_nscdd, only: nscdd_t
@@ -40,16 +42,18 @@ module gravier_newton
   !> Of one subdomain.
   type :: newton_part_t
     type(proximal_law_t) :: law
-    !> Newton's iterate, its step, the best impulses so far (lanes, nc, blocks) [N s]; velocities of the contacts [m/s]
-    real(dp), allocatable :: r(:, :, :), step(:, :, :), best(:, :, :), v(:, :, :)
-    !> where the sweeps were left: impulses, velocities of the bodies (nv, n_columns)
-    real(dp), allocatable :: swept(:, :, :), swept_velocity(:, :)
+    !> Newton's step (lanes, nc, blocks) [N s]; velocities of the contacts [m/s]
+    real(dp), allocatable :: step(:, :, :), v(:, :, :)
+    !> velocities of the bodies where the sweeps were left (nv, n_columns)
+    real(dp), allocatable :: swept_velocity(:, :)
   end type newton_part_t
 
   type, extends(nscdd_t) :: newton_t
     type(enriched_matrix_t), private :: matrix
     type(interface_direct_t), private :: interface_solver
     type(newton_part_t), allocatable, private :: part(:)
+    !> Newton's iterate, the best impulses so far, those where the sweeps were left
+    type(kept_impulses_t), allocatable, private :: r(:), best(:), swept(:)
     type(interface_field_t), allocatable, private :: b(:), f(:)
     logical, private :: sweeping = .true.
     type(sweep_turns_t), private :: turns
@@ -119,24 +123,31 @@ contains
     call self%matrix%start(problem, error)
     call problem%comm%agree(error)
     if (allocated(error)) return
-    call make_field(problem, self%b)
-    call make_field(problem, self%f)
-    if (allocated(self%part)) deallocate (self%part)
-    allocate (self%part(size(problem%sub)))
+    call make_field(problem%shared, self%b)
+    call make_field(problem%shared, self%f)
+    if (allocated(self%part)) deallocate (self%part, self%r, self%best, self%swept)
+    allocate (self%part(size(problem%sub)), self%r(size(problem%sub)), self%best(size(problem%sub)), self%swept(size(problem%sub)))
+    call copy_impulses(problem, self%best)
     do s = 1, size(self%part)
-      associate (part => self%part(s), impulse => problem%sub(s)%impulse)
-        call part%law%init(problem%kernels, problem%sub(s))
-        part%best = impulse
-        allocate (part%r, part%step, part%v, part%swept, mold=impulse)
-        allocate (part%swept_velocity, mold=problem%sub(s)%velocity)
-        part%step(:, :, :) = 0.0_dp
-        part%v(:, :, :) = 0.0_dp
-      end associate
+      call make_room(problem%kernels, problem%sub(s), self%part(s))
     end do
     self%turns = sweep_turns_t()
     self%least = huge(1.0_dp)
     call begin_sweeps(self)
   end subroutine newton_start
+
+  !> Room for the steps in a subdomain, and its law.
+  subroutine make_room(kernels, sub, part)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    type(newton_part_t), intent(inout) :: part
+
+    call part%law%init(kernels, sub)
+    allocate (part%step, part%v, mold=sub%impulse)
+    part%step(:, :, :) = 0.0_dp
+    part%v(:, :, :) = 0.0_dp
+    allocate (part%swept_velocity, mold=sub%velocity)
+  end subroutine make_room
 
   !> Sweeps come next.
   subroutine begin_sweeps(self)
@@ -179,10 +190,10 @@ contains
     self%taken = 0
     self%weight = proximal_weight_t()
     call keep_best(self, problem, defect)
+    call copy_impulses(problem, self%r)
+    call copy_impulses(problem, self%swept)
     do s = 1, size(self%part)
       associate (part => self%part(s), sub => problem%sub(s))
-        part%r(:, :, :) = sub%impulse
-        part%swept(:, :, :) = sub%impulse
         part%swept_velocity(:, :) = sub%velocity
       end associate
     end do
@@ -202,10 +213,10 @@ contains
     integer :: s
 
     do s = 1, size(self%part)
-      if (moves) self%part(s)%law%centre(:, :, :) = self%part(s)%r
-      self%part(s)%r(:, :, :) = self%part(s)%law%centre
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%r
+      if (moves) self%part(s)%law%centre(:, :, :) = self%r(s)%value
+      self%r(s)%value(:, :, :) = self%part(s)%law%centre
     end do
+    call restore_impulses(problem, self%r)
     call evaluate(self, problem, self%size_of_f)
     self%inner = 0
     self%past(:) = 0.0_dp
@@ -224,7 +235,7 @@ contains
     call problem%evaluate()
     do s = 1, size(problem%sub)
       associate (part => self%part(s), sub => problem%sub(s))
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, part%v)
+        call sub%contact_velocity(problem%kernels, sub%v_global, part%v)
         call part%law%evaluate(problem%kernels, sub, part%v, self%weight%alpha, squares(s))
       end associate
     end do
@@ -240,7 +251,7 @@ contains
     type(error_t), allocatable :: singular
     real(dp) :: defect
 
-    if (problem%cell%is_driven) call follow_cell(self, problem)
+    if (problem%cell_is_driven()) call follow_cell(self, problem)
     self%past(1 + mod(self%inner, memory)) = self%size_of_f
     call find_step(self, problem, singular)
     self%inner = self%inner + 1
@@ -263,13 +274,10 @@ contains
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: ignored
-    integer :: s
 
     call problem%evaluate()
     call problem%residual(ignored, self%least)
-    do s = 1, size(self%part)
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%r
-    end do
+    call restore_impulses(problem, self%r)
     call evaluate(self, problem, self%size_of_f)
   end subroutine follow_cell
 
@@ -280,10 +288,10 @@ contains
     integer :: s
 
     if (self%acceleration%on .or. .not. self%least < self%least_swept) then
+      call restore_impulses(problem, self%swept)
       do s = 1, size(self%part)
         ! operators of accelerated sweeps are relaxed
         if (.not. self%acceleration%on) call problem%sub(s)%share_masses(problem%kernels, .true.)
-        problem%sub(s)%impulse(:, :, :) = self%part(s)%swept
         problem%sub(s)%velocity(:, :) = self%part(s)%swept_velocity
       end do
     else
@@ -309,7 +317,7 @@ contains
     call start_timer(phase_factorise)
     do s = 1, size(problem%sub)
       call self%part(s)%law%linearise(problem%kernels, problem%sub(s), self%weight%alpha)
-      call self%matrix%factorise_blocks(problem, s, self%part(s)%law%slope, singular)
+      call self%matrix%factorise_blocks(problem%kernels, problem%sub(s), s, self%part(s)%law%slope, singular)
     end do
     call problem%comm%agree(singular)
     if (.not. allocated(singular)) call self%interface_solver%prepare(problem, self%matrix, singular)
@@ -318,12 +326,12 @@ contains
     call start_timer(phase_interface_solve)
     if (problem%n_subdomains > 1) call find_multipliers(self, problem, singular)
     do s = 1, size(problem%sub)
-      call load_transpose(problem, s, self%f(s), self%matrix)
+      call load_transpose(problem%shared, s, self%f(s), self%matrix)
       associate (part => self%part(s), sub => problem%sub(s), work => self%matrix%part(s)%body_work)
         work(:, :) = -work
-        call problem%kernels%add_reaction(sub%pair, sub%hot, part%law%offset, work)
-        call self%matrix%solve(problem, s, work, singular)
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, work, part%v)
+        call sub%add_reaction(problem%kernels, part%law%offset, work)
+        call self%matrix%solve(problem%sub(s), s, work, singular)
+        call sub%contact_velocity(problem%kernels, work, part%v)
         call part%law%find_step(part%v, part%step)
         sub%velocity(:, :) = sub%v_global + work
       end associate
@@ -342,11 +350,11 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s), work => self%matrix%part(s)%body_work)
         work(:, :) = 0.0_dp
-        call problem%kernels%add_reaction(sub%pair, sub%hot, self%part(s)%law%offset, work)
-        call self%matrix%solve(problem, s, work, error)
+        call sub%add_reaction(problem%kernels, self%part(s)%law%offset, work)
+        call self%matrix%solve(problem%sub(s), s, work, error)
       end associate
     end do
-    call chain_differences(problem, self%matrix, self%b)
+    call chain_differences(problem%shared, self%matrix, self%b)
     call problem%comm%agree(error)
     if (allocated(error)) return
     call self%interface_solver%solve(problem, self%matrix, self%b, self%f, error)
@@ -357,7 +365,7 @@ contains
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
     real(dp) :: length, best_length, least, reference
-    integer :: k, s
+    integer :: k
 
     reference = maxval(self%past)
     length = 1.0_dp
@@ -373,9 +381,7 @@ contains
       length = 0.5_dp*length
     end do
     if (k > most_halvings) call go(best_length)
-    do s = 1, size(self%part)
-      self%part(s)%r(:, :, :) = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, self%r)
 
   contains
 
@@ -383,10 +389,12 @@ contains
       real(dp), intent(in) :: part_of_step
       integer :: i
 
-      do i = 1, size(self%part)
-        problem%sub(i)%impulse(:, :, :) = self%part(i)%r
-        if (part_of_step > 0.0_dp) problem%sub(i)%impulse(:, :, :) = self%part(i)%r + part_of_step*self%part(i)%step
-      end do
+      call restore_impulses(problem, self%r)
+      if (part_of_step > 0.0_dp) then
+        do i = 1, size(self%part)
+          call problem%sub(i)%add_impulses(part_of_step, self%part(i)%step)
+        end do
+      end if
       call evaluate(self, problem, self%size_of_f)
     end subroutine go
 
@@ -403,7 +411,7 @@ contains
     integer :: s
 
     do s = 1, size(problem%sub)
-      call project_on_cones(problem%kernels, problem%sub(s)%n_contacts, problem%sub(s)%hot, problem%sub(s)%impulse)
+      call problem%sub(s)%project_impulses(problem%kernels)
     end do
     call problem%evaluate()
     call problem%residual(ignored, defect)
@@ -415,24 +423,18 @@ contains
     class(newton_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(in) :: defect
-    integer :: s
 
     if (.not. defect < self%least) return
     self%least = defect
-    do s = 1, size(self%part)
-      self%part(s)%best(:, :, :) = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, self%best)
   end subroutine newton_see
 
   !> The impulses of the problem are the best so far.
   subroutine take_best(self, problem)
     class(newton_t), intent(in) :: self
     type(contact_problem_t), intent(inout) :: problem
-    integer :: s
 
-    do s = 1, size(self%part)
-      problem%sub(s)%impulse(:, :, :) = self%part(s)%best
-    end do
+    call restore_impulses(problem, self%best)
   end subroutine take_best
 
   !> The iterate becomes the next centre if it is worth it, alpha goes with the steps taken; where all that has brought no
@@ -474,7 +476,7 @@ contains
     class(newton_t), intent(inout) :: self
     call self%matrix%free()
     call self%interface_solver%free()
-    if (allocated(self%part)) deallocate (self%part, self%b, self%f)
+    if (allocated(self%part)) deallocate (self%part, self%r, self%best, self%swept, self%b, self%f)
     self%work = work_t()
   end subroutine newton_free
 

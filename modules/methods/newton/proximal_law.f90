@@ -13,7 +13,7 @@ module gravier_proximal_law
   use gravier_kinds, only: dp
   use gravier_friction_cone, only: project_by_parts, sticks
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_contact_operator, only: find_local_operator, rolling_operator
   implicit none
   private
@@ -73,14 +73,14 @@ contains
     allocate (self%open(n), source=.true.)
     allocate (self%state(self%parts, n), source=sticks)
     if (allocated(self%yielding)) deallocate (self%yielding)
-    if (kernels%row%compliance_n > 0) allocate (self%yielding(nc, n), source=0.0_dp)
+    if (kernels%has_compliance()) allocate (self%yielding(nc, n), source=0.0_dp)
     w_rolling = 0.0_dp
     do c = 1, n
       call find_local_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass, w)
       self%softness(1, c) = 1.0_dp/w(1)
       self%softness(2:kernels%nf, c) = 1.0_dp/w(2)
       ! moments on bodies that do not turn stay as they are
-      if (kernels%row%rolling_radius > 0) w_rolling = rolling_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass)
+      if (kernels%has_rolling()) w_rolling = rolling_operator(kernels, sub%pair, sub%hot, c, sub%inverse_mass)
       if (w_rolling > 0.0_dp) self%softness(kernels%nf + 1:, c) = 1.0_dp/w_rolling
       if (.not. allocated(self%yielding)) cycle
       self%yielding(1, c) = sub%hot(lane_of(c), kernels%row%compliance_n, block_of(c))/w(1)
@@ -107,7 +107,7 @@ contains
 
     self%parts = 0
     if (kernels%nf > 1) call add(2, kernels%nf, kernels%row%friction)
-    if (kernels%row%rolling_radius == 0) return
+    if (.not. kernels%has_rolling()) return
     call add(kernels%nf + 1, 2*kernels%nf - 1, kernels%row%rolling_friction)
     if (kernels%nd == 3) call add(kernels%nc, kernels%nc, kernels%row%pivoting_friction)
 

@@ -4,6 +4,9 @@ module gravier_schwarz
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange
   use gravier_body_mass, only: add_inverse_mass, inverse_product
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_acceleration, only: acceleration_t, extrapolate
   use gravier_method, only: method_t, take_options, work_t, start_sweeps, sweep_all
@@ -117,23 +120,24 @@ contains
     if (measure) jump = problem%jump()
     call start_timer(phase_exchange)
     do s = 1, size(problem%sub)
-      call shared_reactions(problem, s, self%load(s))
+      call shared_reactions(problem%sub(s), problem%shared, s, self%load(s))
       call problem%shared%load(s, problem%sub(s)%reaction)
     end do
-    call take_neighbour_loads(problem, self%relaxation, self%load, self%work)
+    call take_neighbour_loads(problem%sub, problem%comm, problem%shared, self%relaxation, self%load, self%work)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
   end subroutine schwarz_iterate
 
   !> R_E = M (V_E - M^-1 R^d) - R_E^ddm on the shared bodies of subdomain `s`, into `reaction`: equal to H_E r_E, without
   !> a pass over the contacts. Components that cannot move have none.
-  subroutine shared_reactions(problem, s, load)
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine shared_reactions(sub, shared, s, load)
+    type(subproblem_t), intent(inout) :: sub
+    type(shared_exchange_t), intent(in) :: shared
     integer, intent(in) :: s
     type(neighbour_load_t), intent(in) :: load
     integer :: k, b
 
-    associate (sub => problem%sub(s), part => problem%shared%part(s))
+    associate (part => shared%part(s))
       do k = 1, part%n_shared
         b = part%body(k)
         sub%reaction(:, b) = sub%velocity(:, b) - sub%v_free(:, b)
@@ -152,48 +156,63 @@ contains
     !> started anew
     type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), allocatable, intent(out) :: load(:)
-    integer :: s, k, d
+    integer :: s
 
     allocate (load(size(problem%sub)))
     do s = 1, size(problem%sub)
       call problem%own_reactions(s)
       call problem%shared%load(s, problem%sub(s)%reaction)
-      allocate (load(s)%value(problem%kernels%nv, problem%shared%part(s)%n_shared), source=0.0_dp)
+      allocate (load(s)%value(problem%nv, problem%shared%n_shared(s)), source=0.0_dp)
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
       call problem%shared%sum_copies(s, problem%sub(s)%reaction, mean=.false.)
-      do k = 1, problem%shared%part(s)%n_shared
-        call problem%shared%add_copies(s, k, load(s)%value(:, k))
-        do d = 1, problem%kernels%nv
-          if (.not. problem%sub(s)%moves(d, problem%shared%part(s)%body(k))) load(s)%value(d, k) = 0.0_dp
-        end do
-      end do
+      call take_reactions_of_others(problem%sub(s), problem%shared, s, load(s)%value)
       allocate (load(s)%change, mold=load(s)%value)
       load(s)%change(:, :) = 0.0_dp
       if (acceleration) load(s)%previous = load(s)%value
     end do
     if (relaxation%automatic) then
-      relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem))
+      relaxation = relaxation_t(least=1.0_dp/largest_multiplicity(problem%comm, problem%shared))
     else
       relaxation = relaxation_t(factor=relaxation%factor, automatic=.false., watched=relaxation%watched)
     end if
   end subroutine start_neighbour_loads
 
+  !> Sum of the reactions of the other copies of each body that a subdomain shares; none on components that cannot move.
+  subroutine take_reactions_of_others(sub, shared, s, load)
+    type(subproblem_t), intent(in) :: sub
+    type(shared_exchange_t), intent(in) :: shared
+    integer, intent(in) :: s
+    !> (nv, n_shared), zero on entry [N s, N m s]
+    real(dp), intent(inout), contiguous :: load(:, :)
+    integer :: k, d
+
+    associate (part => shared%part(s))
+      do k = 1, part%n_shared
+        call shared%add_copies(s, k, load(:, k))
+        do d = 1, size(load, 1)
+          if (.not. sub%moves(d, part%body(k))) load(d, k) = 0.0_dp
+        end do
+      end do
+    end associate
+  end subroutine take_reactions_of_others
+
   !> Subdomains that share the body which most share. Collective.
-  real(dp) function largest_multiplicity(problem) result(largest)
-    type(contact_problem_t), intent(in) :: problem
+  real(dp) function largest_multiplicity(comm, shared) result(largest)
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(in) :: shared
     integer :: s, k
 
     largest = 1.0_dp
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s))
+    do s = 1, size(shared%part)
+      associate (part => shared%part(s))
         do k = 1, part%n_shared
           largest = max(largest, real(part%multiplicity(k), dp))
         end do
       end associate
     end do
-    largest = problem%comm%highest(largest)
+    largest = comm%highest(largest)
   end function largest_multiplicity
 
   !> Where sweeps are accelerated, bring the loads to those under the extrapolated impulses, as `begin_sweeps` does with the
@@ -211,32 +230,34 @@ contains
 
   !> Pass the reactions loaded into the exchange on, R_E^ddm = sum over E* /= E of B_E B_E*^T R_E*, and change the velocities by
   !> what the loads have changed. With under-relaxation, only a fraction of the change is applied. Collective.
-  subroutine take_neighbour_loads(problem, relaxation, load, work)
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine take_neighbour_loads(sub, comm, shared, relaxation, load, work)
+    type(subproblem_t), intent(inout) :: sub(:)
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(inout) :: shared
     type(relaxation_t), intent(inout) :: relaxation
     type(neighbour_load_t), intent(inout) :: load(:)
     !> counts how often the factor is lowered
     type(work_t), intent(inout) :: work
-    real(dp) :: change(problem%kernels%nv), parts(2, size(load)), sums(2), factor
+    real(dp) :: change(shared%width), parts(2, size(load)), sums(2), factor
     integer :: s, k, b
 
-    call problem%shared%pass()
+    call shared%pass()
     parts(:, :) = 0.0_dp
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))
+    do s = 1, size(sub)
+      associate (part => shared%part(s), own => sub(s), load => load(s))
         do k = 1, part%n_shared
           b = part%body(k)
           change(:) = 0.0_dp
-          call problem%shared%add_copies(s, k, change)
+          call shared%add_copies(s, k, change)
           change(:) = change - load%value(:, k)
-          parts(1, s) = parts(1, s) + inverse_product(sub%weight(:, b), change, change)
-          parts(2, s) = parts(2, s) + inverse_product(sub%weight(:, b), change, load%change(:, k))
+          parts(1, s) = parts(1, s) + inverse_product(own%weight(:, b), change, change)
+          parts(2, s) = parts(2, s) + inverse_product(own%weight(:, b), change, load%change(:, k))
           load%change(:, k) = change
         end do
       end associate
     end do
     if (relaxation%automatic .or. relaxation%watched) then
-      call problem%comm%sum_parts(parts, sums)
+      call comm%sum_parts(parts, sums)
       factor = relaxation%factor
       call relaxation%adapt(sums(1), sums(2))
       if (relaxation%factor < factor) then
@@ -244,13 +265,13 @@ contains
         work%least_factor = min(work%least_factor, relaxation%factor)
       end if
     end if
-    do s = 1, size(problem%sub)
-      associate (part => problem%shared%part(s), sub => problem%sub(s), load => load(s))
+    do s = 1, size(sub)
+      associate (part => shared%part(s), own => sub(s), load => load(s))
         do k = 1, part%n_shared
           b = part%body(k)
           change(:) = relaxation%factor*load%change(:, k)
           load%value(:, k) = load%value(:, k) + change
-          call add_inverse_mass(sub%weight(:, b), change, sub%velocity(:, b))
+          call add_inverse_mass(own%weight(:, b), change, own%velocity(:, b))
         end do
       end associate
     end do

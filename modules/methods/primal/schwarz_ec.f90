@@ -3,6 +3,9 @@ module gravier_schwarz_ec
   use gravier_kinds, only: dp
   use gravier_errors, only: error_t
   use gravier_timers, only: start_timer, stop_timer, phase_exchange, phase_interface_solve
+  use gravier_contact_kernels, only: kernels_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_contact_problem, only: contact_problem_t
   use gravier_method, only: method_t, take_options, work_t, start_sweeps
   use gravier_method_options, only: method_features_t, method_options_t, held_list_t
@@ -93,20 +96,20 @@ contains
     call sweep_all_recording(self, problem, self%matrix)
     if (measure) jump = problem%jump()
     call self%matrix%count_use(due)
-    if (due .or. self%matrix%direction%active_only) then
+    if (due .or. self%matrix%on_active_only()) then
       call self%matrix%update(problem, changed, error)
       call problem%comm%agree(error)
       if (allocated(error)) return
     end if
     call start_timer(phase_interface_solve)
     do s = 1, size(problem%sub)
-      call enriched_reactions(self, problem, s, error)
+      call enriched_reactions(self, problem%kernels, problem%shared, problem%sub(s), s, error)
       call problem%shared%load(s, self%matrix%part(s)%body_work)
     end do
     call stop_timer(phase_interface_solve)
     call problem%comm%agree(error)
     call start_timer(phase_exchange)
-    call take_neighbour_loads(problem, self%relaxation, self%load, self%work)
+    call take_neighbour_loads(problem%sub, problem%comm, problem%shared, self%relaxation, self%load, self%work)
     call stop_timer(phase_exchange)
     self%work%interface_solves = self%work%interface_solves + 1
     if (.not. is_enriched(self)) return
@@ -126,25 +129,28 @@ contains
 
   pure logical function is_enriched(self)
     class(schwarz_ec_t), intent(in) :: self
-    is_enriched = self%matrix%direction%value*self%matrix%factor > 0.0_dp
+    is_enriched = self%matrix%is_enriched()
   end function is_enriched
 
   !> R~_E = (I + L_E M_E^-1)^-1 ( R_E - L_E M_E^-1 (R_E^d + R_E^ddm) + H_E l_E v_E ) with L_E = H_E l_E H_E^T, on the shared
   !> bodies, into body_work. With I + L M^-1 = (M + L) M^-1 and M V_E = R_E^d + R_E^ddm + R_E this is
   !>   R~_E = R_E + M_E (M_E + L_E)^-1 H_E l_E (v_E - H_E^T V_E),
   !> v_E being the velocity that solved the law: without it R~_E = R_E.
-  subroutine enriched_reactions(self, problem, s, error)
+  subroutine enriched_reactions(self, kernels, shared, sub, s, error)
     class(schwarz_ec_t), intent(inout) :: self
-    type(contact_problem_t), intent(inout) :: problem
+    type(kernels_t), intent(in) :: kernels
+    type(shared_exchange_t), intent(in) :: shared
+    type(subproblem_t), intent(inout) :: sub
+    !> its place on this rank
     integer, intent(in) :: s
     type(error_t), allocatable, intent(inout) :: error
     integer :: k, b
 
-    call shared_reactions(problem, s, self%load(s))
-    call self%matrix%enrich(problem, s, error)
-    associate (work => self%matrix%part(s)%body_work, sub => problem%sub(s), shared => problem%shared%part(s))
-      do k = 1, shared%n_shared
-        b = shared%body(k)
+    call shared_reactions(sub, shared, s, self%load(s))
+    call self%matrix%enrich(kernels, sub, s, error)
+    associate (work => self%matrix%part(s)%body_work, part => shared%part(s))
+      do k = 1, part%n_shared
+        b = part%body(k)
         call sub%multiply_mass(b, work(:, b))
         work(:, b) = sub%reaction(:, b) + work(:, b)
       end do

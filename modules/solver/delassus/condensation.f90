@@ -58,18 +58,13 @@ contains
     type(error_t), allocatable, intent(inout) :: error
     type(unknowns_t) :: unknowns
     type(entries_t) :: nothing
-    integer :: e, i, n
+    integer :: i, n
 
     if (allocated(error)) return
     n = size(global%f)
     do i = 1, n
-      do e = global%m%start(i), global%m%start(i + 1) - 1
-        call append(unknowns%k, i, global%m%column(e), global%m%value(e))
-      end do
-      do e = global%g%start(i), global%g%start(i + 1) - 1
-        call append(unknowns%k, i, n + global%g%column(e), -global%g%value(e))
-        call append(unknowns%k, n + global%g%column(e), i, global%g%value(e))
-      end do
+      call append_row(unknowns%k, global%m, i)
+      call append_constraints(unknowns%k, global%g, i, n)
     end do
     unknowns%name = "the matrix of masses and constraints"
     allocate (unknowns%c(n + size(global%b)))
@@ -91,7 +86,7 @@ contains
     type(multipliers_t), intent(out) :: multipliers
     type(error_t), allocatable, intent(inout) :: error
     type(unknowns_t) :: unknowns
-    integer :: e, i
+    integer :: i
 
     if (allocated(error)) return
     if (size(local%s) == 0) then
@@ -100,9 +95,7 @@ contains
       return
     end if
     do i = 1, size(local%s)
-      do e = local%constraint%start(i), local%constraint%start(i + 1) - 1
-        call append(unknowns%k, i, local%constraint%column(e), local%constraint%value(e))
-      end do
+      call append_row(unknowns%k, local%constraint, i)
     end do
     unknowns%name = "/fclib_local/R"
     unknowns%c = -local%s
@@ -111,6 +104,31 @@ contains
     unknowns%sign = -1.0_dp
     call eliminate(unknowns, local, multipliers, error)
   end subroutine eliminate_constraints
+
+  !> Append row `i` of a matrix.
+  subroutine append_row(entries, matrix, i)
+    type(entries_t), intent(inout) :: entries
+    type(sparse_rows_t), intent(in) :: matrix
+    integer, intent(in) :: i
+    integer :: e
+
+    do e = matrix%start(i), matrix%start(i + 1) - 1
+      call append(entries, i, matrix%column(e), matrix%value(e))
+    end do
+  end subroutine append_row
+
+  !> Append row `i` of -G right of the first `n` columns, and what G^T has of it below the first `n` rows.
+  subroutine append_constraints(entries, g, i, n)
+    type(entries_t), intent(inout) :: entries
+    type(sparse_rows_t), intent(in) :: g
+    integer, intent(in) :: i, n
+    integer :: e
+
+    do e = g%start(i), g%start(i + 1) - 1
+      call append(entries, i, n + g%column(e), -g%value(e))
+      call append(entries, n + g%column(e), i, g%value(e))
+    end do
+  end subroutine append_constraints
 
   !> Add to W and q what the unknowns do.
   subroutine eliminate(unknowns, local, multipliers, error)

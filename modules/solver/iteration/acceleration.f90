@@ -3,6 +3,7 @@ module gravier_acceleration
   use gravier_kinds, only: dp, i8
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method_options, only: held_list_t
   implicit none
   private
@@ -103,13 +104,21 @@ contains
 
     acceleration = acceleration_t(on=.true.)
     call acceleration%choose_steering(problem%n_contacts)
-    if (problem%kernels%row%compliance_n > 0) acceleration%most = most_extrapolation(problem)
+    if (problem%has_compliance()) acceleration%most = most_extrapolation(problem)
     allocate (acceleration%part(size(problem%sub)))
     do s = 1, size(problem%sub)
-      acceleration%part(s)%impulse = problem%sub(s)%impulse
-      acceleration%part(s)%velocity = problem%sub(s)%velocity
+      call keep_start(problem%sub(s), acceleration%part(s))
     end do
   end subroutine start_acceleration
+
+  !> Keep what a subdomain starts from, from which the first iteration has gone on.
+  pure subroutine keep_start(sub, part)
+    type(subproblem_t), intent(in) :: sub
+    type(acceleration_part_t), intent(inout) :: part
+
+    part%impulse = sub%impulse
+    part%velocity = sub%velocity
+  end subroutine keep_start
 
   !> The largest beta that pays where all contacts are compliant, (1 - sqrt(q))/(1 + sqrt(q)) with the least part q that the
   !> compliance has of a local operator (Nesterov 2004, section 2.2.1, for a problem with curvatures between q and 1): more would
@@ -121,7 +130,7 @@ contains
 
     least = 1.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), row => problem%kernels%row)
+      associate (sub => problem%sub(s), row => problem%row)
         do c = 1, sub%n_contacts
           associate (contact => sub%hot(lane_of(c), :, block_of(c)))
             least = min(least, contact(row%compliance_n)*contact(row%per_wnn), contact(row%compliance_t)*contact(row%per_wtt))
@@ -249,7 +258,7 @@ contains
 
     if (acceleration%whole()) then
       factors(:) = 1.0_dp
-    else if (problem%kernels%nd == 2) then
+    else if (problem%nd == 2) then
       factors(:) = relaxation_2d
     else
       factors(:) = relaxation_3d

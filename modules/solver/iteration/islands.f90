@@ -10,7 +10,10 @@ module gravier_islands
   use gravier_narrow, only: narrow
   use gravier_disjoint_sets, only: join_sets, number_sets
   use gravier_body_mass, only: inverse_of_translation
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: islands_t, island_part_t, island_sums_t, find_islands
@@ -64,9 +67,9 @@ contains
     do s = 1, size(problem%sub)
       call join_bodies(problem%sub(s), islands%part(s))
     end do
-    if (problem%n_subdomains > 1) call find_places(problem, islands)
+    if (problem%n_subdomains > 1) call find_places(problem%sub, problem%comm, problem%shared, islands)
     do s = 1, size(mass)
-      call add_masses(problem%sub(s), problem%kernels%nd, islands%part(s), mass(s))
+      call add_masses(problem%sub(s), problem%nd, islands%part(s), mass(s))
     end do
     call islands%complete(problem, 1, mass)
     do s = 1, size(mass)
@@ -116,8 +119,10 @@ contains
   end subroutine add_masses
 
   !> Places of the islands that lie in several subdomains, by the least identifier of the bodies that these share. Collective.
-  subroutine find_places(problem, islands)
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine find_places(sub, comm, shared, islands)
+    type(subproblem_t), intent(in) :: sub(:)
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(inout) :: shared
     type(islands_t), intent(inout) :: islands
     type :: labels_t
       !> least identifier of each island, huge of one that lies in this subdomain alone (islands)
@@ -130,45 +135,45 @@ contains
     logical :: changed
 
     do s = 1, size(label)
-      associate (part => islands%part(s), shared => problem%shared%part(s), sub => problem%sub(s))
+      associate (part => islands%part(s), copies => shared%part(s))
         allocate (label(s)%of_island(part%n), source=huge(1.0_dp))
-        do j = 1, shared%n_shared
-          b = shared%body(j)
+        do j = 1, copies%n_shared
+          b = copies%body(j)
           i = part%of_body(b)
-          label(s)%of_island(i) = min(label(s)%of_island(i), real(sub%id(b), dp))
+          label(s)%of_island(i) = min(label(s)%of_island(i), real(sub(s)%id(b), dp))
         end do
       end associate
     end do
     do
       do s = 1, size(label)
-        associate (part => islands%part(s), shared => problem%shared%part(s))
-          allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
-          do j = 1, shared%n_shared
-            field(1, shared%body(j)) = label(s)%of_island(part%of_body(shared%body(j)))
+        associate (part => islands%part(s), copies => shared%part(s))
+          allocate (field(shared%width, sub(s)%n_columns), source=0.0_dp)
+          do j = 1, copies%n_shared
+            field(1, copies%body(j)) = label(s)%of_island(part%of_body(copies%body(j)))
           end do
-          call problem%shared%load(s, field)
+          call shared%load(s, field)
           deallocate (field)
         end associate
       end do
-      call problem%shared%pass()
+      call shared%pass()
       changed = .false.
       do s = 1, size(label)
-        associate (part => islands%part(s), shared => problem%shared%part(s))
-          do j = 1, shared%n_slots
-            i = part%of_body(shared%slot_body(j))
-            if (.not. shared%recv(1, j) < label(s)%of_island(i)) cycle
-            label(s)%of_island(i) = shared%recv(1, j)
+        associate (part => islands%part(s), copies => shared%part(s))
+          do j = 1, copies%n_slots
+            i = part%of_body(copies%slot_body(j))
+            if (.not. copies%recv(1, j) < label(s)%of_island(i)) cycle
+            label(s)%of_island(i) = copies%recv(1, j)
             changed = .true.
           end do
         end associate
       end do
-      if (.not. problem%comm%any_true(changed)) exit
+      if (.not. comm%any_true(changed)) exit
     end do
     pieces(1) = 0
     do s = 1, size(label)
       pieces(1) = pieces(1) + count(label(s)%of_island < huge(1.0_dp))
     end do
-    call problem%comm%sum_counts(pieces)
+    call comm%sum_counts(pieces)
     islands%n_places = narrow(min(places_a_piece*pieces(1), int(most_places, i8)))
     do s = 1, size(label)
       do i = 1, islands%part(s)%n

@@ -18,9 +18,12 @@
 module gravier_layered_start
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_sweep
-  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, lane_of, block_of
   use gravier_body_mass, only: add_inverse_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_acceleration, only: acceleration_t
   use gravier_method, only: work_t
   use gravier_sweep_order, only: group_contacts
@@ -92,7 +95,7 @@ contains
     sweeps = 0.0_dp
     carried = .false.
     call find_ways(problem, layers)
-    call cut_layers(problem, least_way, layers, n_layers)
+    call cut_layers(problem%sub, problem%comm, least_way, layers, n_layers)
     if (n_layers < 2) return
     call start_timer(phase_sweep)
     call start_velocities(problem, layers)
@@ -101,7 +104,7 @@ contains
     relaxed(:, :) = 0.0_dp
     do l = 0, n_layers - 1
       do s = 1, size(layers)
-        call take_layer(problem, l, s, layers(s))
+        call take_layer(problem%kernels, problem%sub(s), problem%shared, l, s, layers(s))
       end do
       call solve_layer(problem, change, most_sweeps, layers, inner, carried)
       do s = 1, size(layers)
@@ -122,29 +125,39 @@ contains
     type(layers_t), intent(inout) :: layers(:)
     type(supports_t), allocatable :: supports(:)
     type(ways_t) :: ways(size(layers))
-    !> radii and number of the grains
-    real(dp) :: parts(2, size(layers)), sums(2)
     integer :: s
 
-    call find_supports(problem, supports)
-    do s = 1, size(layers)
-      parts(1, s) = sum(problem%sub(s)%radius)
-      parts(2, s) = problem%sub(s)%n_grains
-    end do
-    call problem%comm%sum_parts(parts, sums)
-    call list_closed(problem, ways, unit=2.0_dp*sums(1)/max(1.0_dp, sums(2)))
+    call find_supports(problem%sub, problem%comm, problem%load(1:problem%nd), supports)
+    call list_closed(problem, ways, unit=mean_diameter(problem%sub, problem%comm))
     do s = 1, size(layers)
       where (supports(s)%column) ways(s)%length = 0.0_dp
     end do
-    call shorten_ways(problem, ways)
+    call shorten_ways(problem%comm, problem%shared, ways)
     do s = 1, size(layers)
       call move_alloc(ways(s)%length, layers(s)%way)
     end do
   end subroutine find_ways
 
+  !> Mean diameter of the grains [m]. Collective.
+  real(dp) function mean_diameter(sub, comm)
+    type(subproblem_t), intent(in) :: sub(:)
+    type(communicator_t), intent(in) :: comm
+    !> radii and number of the grains
+    real(dp) :: parts(2, size(sub)), sums(2)
+    integer :: s
+
+    do s = 1, size(sub)
+      parts(1, s) = sum(sub(s)%radius)
+      parts(2, s) = sub(s)%n_grains
+    end do
+    call comm%sum_parts(parts, sums)
+    mean_diameter = 2.0_dp*sums(1)/max(1.0_dp, sums(2))
+  end function mean_diameter
+
   !> The layer of every body and the contacts of every layer. Collective.
-  subroutine cut_layers(problem, least_way, layers, n_layers)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine cut_layers(sub, comm, least_way, layers, n_layers)
+    type(subproblem_t), intent(in) :: sub(:)
+    type(communicator_t), intent(in) :: comm
     !> [mean diameters]
     real(dp), intent(in) :: least_way
     type(layers_t), intent(inout) :: layers(:)
@@ -156,27 +169,27 @@ contains
 
     longest = 0.0_dp
     do s = 1, size(layers)
-      do b = 1, problem%sub(s)%n_bodies
+      do b = 1, sub(s)%n_bodies
         if (layers(s)%way(b) < unreached) longest = max(longest, layers(s)%way(b))
       end do
     end do
-    longest = problem%comm%highest(longest)
+    longest = comm%highest(longest)
     n_layers = 0
     if (longest < least_way) return
     n_layers = ceiling(longest/thickness)
     if (n_layers < 2) return
     do s = 1, size(layers)
-      associate (sub => problem%sub(s), this => layers(s))
+      associate (own => sub(s), this => layers(s))
         ! what hangs on nothing comes first
-        this%way(1:sub%n_bodies) = min(this%way(1:sub%n_bodies), longest)
+        this%way(1:own%n_bodies) = min(this%way(1:own%n_bodies), longest)
         this%longest = longest
-        allocate (this%layer(sub%n_columns), source=n_layers)
-        do b = 1, sub%n_bodies
+        allocate (this%layer(own%n_columns), source=n_layers)
+        do b = 1, own%n_bodies
           this%layer(b) = min(n_layers - 1, floor((longest - this%way(b))/thickness))
         end do
-        allocate (this%first(0:n_layers), this%contact(sub%n_contacts), next(0:n_layers), source=0)
-        do c = 1, sub%n_contacts
-          l = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c)))
+        allocate (this%first(0:n_layers), this%contact(own%n_contacts), next(0:n_layers), source=0)
+        do c = 1, own%n_contacts
+          l = min(this%layer(own%pair(1, c)), this%layer(own%pair(2, c)))
           next(l) = next(l) + 1
         end do
         this%first(0) = 1
@@ -184,8 +197,8 @@ contains
           this%first(l) = this%first(l - 1) + next(l - 1)
         end do
         next(:) = this%first
-        do c = 1, sub%n_contacts
-          l = min(this%layer(sub%pair(1, c)), this%layer(sub%pair(2, c)))
+        do c = 1, own%n_contacts
+          l = min(this%layer(own%pair(1, c)), this%layer(own%pair(2, c)))
           this%contact(next(l)) = c
           next(l) = next(l) + 1
         end do
@@ -215,19 +228,19 @@ contains
   end subroutine start_velocities
 
   !> Pack layer `l` with its halo: what moves, and the contacts of that. Masses of shared bodies are divided among their copies.
-  subroutine take_layer(problem, l, s, this)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine take_layer(kernels, sub, shared, l, s, this)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    type(shared_exchange_t), intent(in) :: shared
     integer, intent(in) :: l, s
     type(layers_t), intent(inout) :: this
     integer, allocatable :: found(:), pair(:, :), order(:)
     integer :: k
 
-    associate (sub => problem%sub(s))
+    associate (part => shared%part(s))
       call start_layer(this, l)
       call find_contacts(sub, this, found)
-      associate (part => problem%shared%part(s))
-        call list_movable(sub, part%body(1:part%n_shared), this, found)
-      end associate
+      call list_movable(sub, part%body(1:part%n_shared), this, found)
       allocate (pair(2, size(found)), order(size(found)))
       do k = 1, size(found)
         pair(:, k) = sub%pair(:, found(k))
@@ -239,7 +252,7 @@ contains
         this%taken(k) = found(order(k))
       end do
       call pack_contacts(sub, this)
-      if (size(found) > 0) call set_operators(problem, size(found), this%pair, this%hot, this%weight)
+      if (size(found) > 0) call set_operators(kernels, size(found), this%pair, this%hot, this%weight)
     end associate
   end subroutine take_layer
 
@@ -362,8 +375,8 @@ contains
   end subroutine pack_contacts
 
   !> Local operators of n > 0 contacts with the weights of what moves.
-  subroutine set_operators(problem, n, pair, hot, weight)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine set_operators(kernels, n, pair, hot, weight)
+    type(kernels_t), intent(in) :: kernels
     integer, intent(in) :: n
     integer, intent(in), contiguous :: pair(:, :)
     real(dp), intent(inout), contiguous :: hot(:, :, :)
@@ -371,7 +384,7 @@ contains
     real(dp) :: whole(3)
 
     whole(:) = 1.0_dp
-    call problem%kernels%set_operators(pair, hot, weight, whole)
+    call kernels%set_operators(pair, hot, weight, whole)
     hot(lane_of(n) + 1:, :, block_of(n)) = 0.0_dp
   end subroutine set_operators
 
@@ -425,7 +438,7 @@ contains
   subroutine hand_on(problem, layers)
     type(contact_problem_t), intent(inout) :: problem
     type(layers_t), intent(inout) :: layers(:)
-    integer :: s, i, b, q, g
+    integer :: s, i, q, g
 
     do s = 1, size(layers)
       associate (this => layers(s), sub => problem%sub(s))
@@ -453,12 +466,19 @@ contains
       end do
     end if
     do s = 1, size(layers)
-      associate (this => layers(s), inverse => problem%sub(s)%inverse_mass)
-        do b = 1, problem%sub(s)%n_bodies
-          call add_inverse_mass(inverse(:, b), this%reaction(:, b), this%loaded(:, b))
-        end do
-      end associate
+      call load_bodies(problem%sub(s), layers(s))
     end do
   end subroutine hand_on
+
+  !> Add to the velocities of the bodies what their reactions make of them.
+  pure subroutine load_bodies(sub, this)
+    type(subproblem_t), intent(in) :: sub
+    type(layers_t), intent(inout) :: this
+    integer :: b
+
+    do b = 1, sub%n_bodies
+      call add_inverse_mass(sub%inverse_mass(:, b), this%reaction(:, b), this%loaded(:, b))
+    end do
+  end subroutine load_bodies
 
 end module gravier_layered_start

@@ -12,7 +12,9 @@ module gravier_levels
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_contact_kernels, only: lanes, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_supports, only: supports_t, find_supports
   use gravier_ways, only: ways_t, list_closed, shorten_ways, unreached
   implicit none
@@ -89,7 +91,7 @@ contains
     integer :: s, b, round
     logical :: starts
 
-    call find_supports(problem, supports)
+    call find_supports(problem%sub, problem%comm, problem%load(1:problem%nd), supports)
     call list_closed(problem, ways)
     do round = 1, 3
       starts = .false.
@@ -98,17 +100,17 @@ contains
           do b = sub%n_grains + 1, sub%n_columns
             if (length(b) < unreached) cycle
             if (round == 1 .and. .not. supports(s)%column(b)) cycle
-            if (round == 2 .and. any(sub%inverse_mass(1:problem%kernels%nd, b) > 0.0_dp)) cycle
+            if (round == 2 .and. any(sub%inverse_mass(1:problem%nd, b) > 0.0_dp)) cycle
             length(b) = 0.0_dp
             starts = .true.
           end do
         end associate
       end do
-      if (problem%comm%any_true(starts)) call shorten_ways(problem, ways)
+      if (problem%comm%any_true(starts)) call shorten_ways(problem%comm, problem%shared, ways)
     end do
     most = 0.0_dp
     do s = 1, size(ways)
-      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(problem%sub(s)%n_columns))
+      if (.not. allocated(self%part(s)%depth)) allocate (self%part(s)%depth(size(ways(s)%length)))
       do b = 1, size(ways(s)%length)
         self%part(s)%depth(b) = afloat
         if (.not. ways(s)%length(b) < unreached) cycle
@@ -211,19 +213,15 @@ contains
     if (self%most_depth < 1) return
     allocate (shared(self%most_depth), source=0.0_dp)
     do s = 1, size(self%part)
-      associate (n => problem%sub(s)%n_columns)
-        if (.not. allocated(self%part(s)%contact)) call order_contacts(problem%sub(s), self%part(s), self%most_depth)
-        allocate (sums(s)%own(problem%kernels%nv, n), source=0.0_dp)
-        allocate (sums(s)%sinks(n), source=0.0_dp)
-      end associate
-      if (problem%n_subdomains == 1) cycle
-      allocate (sums(s)%all, mold=sums(s)%own)
-      do b = 1, problem%shared%part(s)%n_shared
-        l = self%part(s)%depth(problem%shared%part(s)%body(b))
-        if (l > 0) shared(l) = 1.0_dp
-      end do
+      if (.not. allocated(self%part(s)%contact)) call order_contacts(problem%sub(s), self%part(s), self%most_depth)
+      allocate (sums(s)%own(problem%nv, size(self%part(s)%depth)), source=0.0_dp)
+      allocate (sums(s)%sinks(size(self%part(s)%depth)), source=0.0_dp)
+      if (problem%n_subdomains > 1) allocate (sums(s)%all, mold=sums(s)%own)
     end do
-    if (problem%n_subdomains > 1) call problem%comm%highest_of(shared)
+    if (problem%n_subdomains > 1) then
+      call mark_shared_depths(self%part, problem%shared, shared)
+      call problem%comm%highest_of(shared)
+    end if
     do l = 1, self%most_depth
       do s = 1, size(self%part)
         call add_depth(problem%sub(s), self%part(s), l, largest_violation, sums(s)%own, sums(s)%sinks)
@@ -232,13 +230,7 @@ contains
       if (.not. shared(l) > 0.0_dp) cycle
       call problem%shared%pass()
       do s = 1, size(self%part)
-        associate (bodies => problem%shared%part(s)%body(1:problem%shared%part(s)%n_shared))
-          sums(s)%all(:, bodies) = sums(s)%own(:, bodies)
-          call problem%shared%sum_copies(s, sums(s)%all, mean=.false.)
-          do b = 1, size(bodies)
-            sums(s)%sinks(bodies(b)) = mean_of(sums(s)%all(:, bodies(b)))
-          end do
-        end associate
+        call sum_over_copies(problem%shared, s, sums(s)%own, sums(s)%all, sums(s)%sinks)
       end do
     end do
     parts(:, :) = 0.0_dp
@@ -249,7 +241,7 @@ contains
           if (self%part(s)%depth(b) == afloat) cycle
           sinking = abs(sums(s)%sinks(b))
           fastest(1) = max(fastest(1), sinking)
-          if (sinking > fastest(2)) fastest(2) = max(fastest(2), min(sinking, norm2(sub%v_global(1:problem%kernels%nd, b))))
+          if (sinking > fastest(2)) fastest(2) = max(fastest(2), min(sinking, norm2(sub%v_global(1:problem%nd, b))))
           parts(1, s) = parts(1, s) + sinking**2/sub%multiplicity(b)
           parts(2, s) = parts(2, s) + 1.0_dp/sub%multiplicity(b)
         end do
@@ -263,6 +255,43 @@ contains
     call stop_timer(phase_reduction)
     if (means(2) > 0.0_dp) self%mean_of_bodies = sqrt(means(1)/means(2))
   end subroutine levels_follow
+
+  !> Mark the depths that subdomains share bodies of.
+  pure subroutine mark_shared_depths(part, exchange, shared)
+    type(level_part_t), intent(in) :: part(:)
+    type(shared_exchange_t), intent(in) :: exchange
+    !> 1 for these, 0 for others
+    real(dp), intent(inout), contiguous :: shared(:)
+    integer :: s, k, depth
+
+    do s = 1, size(part)
+      associate (copies => exchange%part(s))
+        do k = 1, copies%n_shared
+          depth = part(s)%depth(copies%body(k))
+          if (depth > 0) shared(depth) = 1.0_dp
+        end do
+      end associate
+    end do
+  end subroutine mark_shared_depths
+
+  !> The sums of the shared bodies of subdomain `s` over all copies, which are passed on, and how fast these bodies sink.
+  subroutine sum_over_copies(exchange, s, own, all, sinks)
+    type(shared_exchange_t), intent(in) :: exchange
+    integer, intent(in) :: s
+    real(dp), intent(in), contiguous :: own(:, :)
+    real(dp), intent(inout), contiguous :: all(:, :), sinks(:)
+    integer :: k
+
+    associate (copies => exchange%part(s))
+      do k = 1, copies%n_shared
+        all(:, copies%body(k)) = own(:, copies%body(k))
+      end do
+      call exchange%sum_copies(s, all, mean=.false.)
+      do k = 1, copies%n_shared
+        sinks(copies%body(k)) = mean_of(all(:, copies%body(k)))
+      end do
+    end associate
+  end subroutine sum_over_copies
 
   !> List the contacts between two depths by depth.
   subroutine order_contacts(sub, part, most_depth)

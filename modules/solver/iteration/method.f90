@@ -221,13 +221,11 @@ contains
       call problem%evaluate()
     else
       do s = 1, size(problem%sub)
-        problem%sub(s)%reaction(:, :) = 0.0_dp
-        problem%sub(s)%v_global(:, :) = problem%sub(s)%v_free
+        call problem%sub(s)%start_without_impulses()
       end do
     end if
     do s = 1, size(problem%sub)
-      call problem%sub(s)%share_masses(problem%kernels, shared_masses)
-      problem%sub(s)%velocity(:, :) = problem%sub(s)%v_global
+      call problem%sub(s)%start_sweeps(problem%kernels, shared_masses)
     end do
     if (allocated(problem%progress)) deallocate (problem%progress)
     allocate (problem%progress(2, size(problem%sub)), source=0.0_dp)

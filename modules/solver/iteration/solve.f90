@@ -72,7 +72,7 @@ contains
         & state%trial%calls(report%iterations)
       call method%iterate(problem, measure, report%jump, error)
       if (allocated(error)) return
-      if (problem%cell%is_driven) call respond(problem)
+      if (problem%cell_is_driven()) call respond(problem)
       if (measure) then
         call check(state, problem, method, control, report, done, exact)
         if (done) exit
@@ -135,7 +135,7 @@ contains
     real(dp) :: ignored
 
     call method%conclude(problem)
-    if (problem%cell%is_driven) call respond(problem)
+    if (problem%cell_is_driven()) call respond(problem)
     call problem%residual(report%residual, ignored)
     call state%velocity%bound(problem)
     call complete_estimate(state, problem, method, report)

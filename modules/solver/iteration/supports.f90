@@ -2,7 +2,8 @@
 module gravier_supports
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes
-  use gravier_contact_problem, only: contact_problem_t
+  use gravier_communicator, only: communicator_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: supports_t, find_supports
@@ -19,64 +20,78 @@ module gravier_supports
 contains
 
   !> Find them by the mean over the contacts of each boundary. Without a uniform load nothing supports. Collective.
-  subroutine find_supports(problem, supports)
-    type(contact_problem_t), intent(in) :: problem
+  subroutine find_supports(sub, comm, load, supports)
+    type(subproblem_t), intent(in) :: sub(:)
+    type(communicator_t), intent(in) :: comm
+    !> change of velocity in a step by loads that are the same for all grains (nd) [m/s]
+    real(dp), intent(in) :: load(:)
     type(supports_t), allocatable, intent(out) :: supports(:)
     !> of one subdomain: -n . u and the number of its contacts, by boundary (2 boundaries)
     real(dp), allocatable :: parts(:, :), sums(:)
-    real(dp) :: load, pressing
-    integer :: s, b, g, q, n
+    real(dp) :: size_of_load
+    integer :: s, b, n
 
-    allocate (supports(size(problem%sub)))
+    allocate (supports(size(sub)))
     n = 0
     do s = 1, size(supports)
-      allocate (supports(s)%column(problem%sub(s)%n_columns), source=.false.)
+      allocate (supports(s)%column(sub(s)%n_columns), source=.false.)
     end do
-    load = norm2(problem%load(1:problem%kernels%nd))
-    if (.not. load > 0.0_dp) return
+    size_of_load = norm2(load)
+    if (.not. size_of_load > 0.0_dp) return
     do s = 1, size(supports)
-      if (size(problem%sub(s)%boundary) > 0) n = max(n, maxval(problem%sub(s)%boundary))
+      if (size(sub(s)%boundary) > 0) n = max(n, maxval(sub(s)%boundary))
     end do
-    n = nint(problem%comm%highest(real(n, dp)))
+    n = nint(comm%highest(real(n, dp)))
     allocate (parts(2*n, size(supports)), sums(2*n))
     parts(:, :) = 0.0_dp
     do s = 1, size(supports)
-      associate (sub => problem%sub(s))
-        do g = 1, size(sub%hot, 3)
-          do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
-            if (maxval(sub%pair(:, (g - 1)*lanes + q)) <= sub%n_bodies) cycle
-            pressing = dot_product(sub%hot(q, 1:problem%kernels%nd, g), problem%load(1:problem%kernels%nd))
-            call add_pressing(sub%pair(1, (g - 1)*lanes + q), pressing)
-            call add_pressing(sub%pair(2, (g - 1)*lanes + q), -pressing)
-          end do
+      call add_contacts(sub(s), load, parts(1:n, s), parts(n + 1:, s))
+    end do
+    call comm%sum_parts(parts, sums)
+    do s = 1, size(supports)
+      associate (boundary => sub(s)%boundary)
+        do b = sub(s)%n_bodies + 1, sub(s)%n_columns
+          supports(s)%column(b) = boundary(b) == 0
+          if (boundary(b) > 0) supports(s)%column(b) = sums(boundary(b)) > least_pressing*size_of_load*sums(n + boundary(b))
         end do
       end associate
     end do
-    call problem%comm%sum_parts(parts, sums)
-    do s = 1, size(supports)
-      associate (sub => problem%sub(s))
-        do b = sub%n_bodies + 1, sub%n_columns
-          supports(s)%column(b) = sub%boundary(b) == 0
-          if (sub%boundary(b) > 0) supports(s)%column(b) = sums(sub%boundary(b)) > least_pressing*load*sums(n + sub%boundary(b))
-        end do
-      end associate
+  end subroutine find_supports
+
+  !> How a load presses against boundaries that move as prescribed, over the contacts of a subdomain.
+  subroutine add_contacts(sub, load, pressing, counts)
+    type(subproblem_t), intent(in) :: sub
+    !> (nd) [m/s]
+    real(dp), intent(in) :: load(:)
+    !> sums of -n . u, and the numbers of contacts (boundaries)
+    real(dp), intent(inout), contiguous :: pressing(:), counts(:)
+    real(dp) :: part
+    integer :: g, q
+
+    do g = 1, size(sub%hot, 3)
+      do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
+        if (maxval(sub%pair(:, (g - 1)*lanes + q)) <= sub%n_bodies) cycle
+        part = dot_product(sub%hot(q, 1:size(load), g), load)
+        call add(sub%pair(1, (g - 1)*lanes + q), part)
+        call add(sub%pair(2, (g - 1)*lanes + q), -part)
+      end do
     end do
 
   contains
 
-    !> A contact of body `b` against which a load presses, where `b` moves as prescribed.
-    subroutine add_pressing(b, pressing)
+    !> A contact of body `b`, where `b` moves as prescribed.
+    subroutine add(b, part)
       integer, intent(in) :: b
-      real(dp), intent(in) :: pressing
+      real(dp), intent(in) :: part
 
-      if (b <= problem%sub(s)%n_bodies) return
-      if (problem%sub(s)%boundary(b) == 0) return
-      associate (k => problem%sub(s)%boundary(b))
-        parts(k, s) = parts(k, s) + pressing
-        parts(n + k, s) = parts(n + k, s) + 1.0_dp
+      if (b <= sub%n_bodies) return
+      if (sub%boundary(b) == 0) return
+      associate (k => sub%boundary(b))
+        pressing(k) = pressing(k) + part
+        counts(k) = counts(k) + 1.0_dp
       end associate
-    end subroutine add_pressing
+    end subroutine add
 
-  end subroutine find_supports
+  end subroutine add_contacts
 
 end module gravier_supports

@@ -15,13 +15,15 @@
 module gravier_test_impulses
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
-  use gravier_contact_kernels, only: lanes, lane_of, block_of
+  use gravier_contact_kernels, only: kernels_t, lanes, lane_of, block_of
   use gravier_body_mass, only: inverse_products, inverse_of_translation, mass_product
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t, n_residual_sums
+  use gravier_contact_problem, only: contact_problem_t, n_residual_sums
+  use gravier_subproblem, only: subproblem_t
+  use gravier_moving_cell, only: cell_motion_t
   use gravier_cell_response, only: virial_of
   use gravier_method, only: method_t
   use gravier_levels, only: level_part_t
-  use gravier_kept_impulses, only: kept_impulses_t
+  use gravier_kept_impulses, only: kept_impulses_t, copy_impulses
   use gravier_islands, only: islands_t, island_part_t, island_sums_t, find_islands
   implicit none
   private
@@ -46,8 +48,6 @@ module gravier_test_impulses
   type :: test_part_t
     !> H y of the tests w/W and r less earlier impulses, summed over copies of bodies (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: local(:, :), recent(:, :)
-    !> earlier impulses where the method keeps none (lanes, nc, blocks) [N s]
-    real(dp), allocatable :: previous(:, :, :)
     !> where contacts attract, the impulses on the bodies (lanes, nc, blocks) [N s], and H of them (nv, n_columns) [N s, N m s]
     real(dp), allocatable :: on_bodies(:, :, :), load(:, :)
     !> P - r of the contacts where stresses drive the cell, else of no block (lanes, nc, blocks) [N s]
@@ -66,6 +66,8 @@ module gravier_test_impulses
     !> iteration at which the earlier impulses were copied, 0 for none; that of the next copy
     integer, private :: taken_at = 0, next_copy = first_copy
     type(test_part_t), allocatable, private :: part(:)
+    !> earlier impulses of each subdomain, where the method keeps none
+    type(kept_impulses_t), allocatable, private :: previous(:)
   contains
     procedure :: start => test_impulses_start
     procedure :: keep_copy => test_impulses_keep_copy
@@ -83,7 +85,7 @@ contains
     class(test_impulses_t), intent(inout) :: self
     type(contact_problem_t), intent(in) :: problem
 
-    allocate (self%part(size(problem%sub)))
+    allocate (self%part(size(problem%sub)), self%previous(size(problem%sub)))
   end subroutine test_impulses_start
 
   !> Keep a copy of the impulses after an iteration, where one is due and the method keeps none.
@@ -92,14 +94,11 @@ contains
     type(contact_problem_t), intent(in) :: problem
     class(method_t), intent(in) :: method
     integer, intent(in) :: iteration
-    integer :: s
 
     if (method%acceleration%extrapolates() .or. iteration < self%next_copy) return
     self%next_copy = max(iteration + 1, nint(iteration*copy_ratio))
     self%taken_at = iteration
-    do s = 1, size(self%part)
-      self%part(s)%previous = problem%sub(s)%impulse
-    end do
+    call copy_impulses(problem, self%previous)
   end subroutine test_impulses_keep_copy
 
   !> The iterations begin anew from other impulses, after `iteration` of them.
@@ -129,7 +128,7 @@ contains
       if (method%acceleration%extrapolates()) then
         earlier(s)%value = method%acceleration%part(s)%impulse
       else
-        earlier(s)%value = self%part(s)%previous
+        earlier(s)%value = self%previous(s)%value
       end if
     end do
   end subroutine test_impulses_take_earlier
@@ -152,7 +151,7 @@ contains
     type(level_part_t), intent(inout) :: levels(:)
     type(projection_t), intent(out) :: found
     !> the sums, and the virials of the tests, one after the other
-    real(dp) :: parts(n_sums + n_tests*count(problem%cell%driven), size(problem%sub)), largest(1)
+    real(dp) :: parts(n_sums + n_tests*problem%cell%n_driven(), size(problem%sub)), largest(1)
     real(dp) :: sums(size(parts, 1))
     integer :: s
 
@@ -166,11 +165,11 @@ contains
         if (sub%n_contacts == 0) cycle
         ! without earlier impulses the third test impulse is 0, which tells nothing
         if (method%acceleration%extrapolates() .and. iteration > 0) then
-          call test(problem, s, part, method%acceleration%part(s)%impulse, levels(s)%power, parts(:, s), largest(1))
+          call test(problem%kernels, sub, part, method%acceleration%part(s)%impulse, levels(s)%power, parts(:, s), largest(1))
         else if (self%has_copy(iteration)) then
-          call test(problem, s, part, part%previous, levels(s)%power, parts(:, s), largest(1))
+          call test(problem%kernels, sub, part, self%previous(s)%value, levels(s)%power, parts(:, s), largest(1))
         else
-          call test(problem, s, part, sub%impulse, levels(s)%power, parts(:, s), largest(1))
+          call test(problem%kernels, sub, part, sub%impulse, levels(s)%power, parts(:, s), largest(1))
         end if
       end associate
     end do
@@ -192,7 +191,7 @@ contains
     call problem%comm%highest_of(largest)
     call stop_timer(phase_reduction)
     call problem%take_residual(sums(1:n_residual_sums), found%residual, found%defect)
-    if (problem%cell%is_driven) call add_cell(problem, sums(n_sums + 1:), sums(at_products + 1:n_sums))
+    if (problem%cell_is_driven()) call add_cell(problem%cell, sums(n_sums + 1:), sums(at_products + 1:n_sums))
     found%square = projection_of(sums(at_powers + 1:at_products), sums(at_products + 1:n_sums), 0.0_dp)
     found%largest_violation = sqrt(largest(1))
   end subroutine test_impulses_project
@@ -215,18 +214,20 @@ contains
     call find_islands(problem, most_of_mass*mass, islands)
     do s = 1, size(sums)
       allocate (sums(s)%value(n_island_sums, islands%part(s)%n), source=0.0_dp)
-      if (method%acceleration%extrapolates() .and. iteration > 0) then
-        call add_contacts(self, problem, islands, s, method%acceleration%part(s)%impulse, sums(s)%value)
-      else if (self%has_copy(iteration)) then
-        call add_contacts(self, problem, islands, s, self%part(s)%previous, sums(s)%value)
-      else
-        call add_contacts(self, problem, islands, s, problem%sub(s)%impulse, sums(s)%value)
-      end if
-      if (allocated(self%part(s)%load)) then
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), self%part(s)%load, islands%part(s), sums(s)%value)
-      else
-        call add_bodies(problem%sub(s), problem%kernels%nd, self%part(s), problem%sub(s)%reaction, islands%part(s), sums(s)%value)
-      end if
+      associate (part => self%part(s), sub => problem%sub(s), value => sums(s)%value)
+        if (method%acceleration%extrapolates() .and. iteration > 0) then
+          call add_contacts(part, problem%kernels, sub, islands, s, method%acceleration%part(s)%impulse, value)
+        else if (self%has_copy(iteration)) then
+          call add_contacts(part, problem%kernels, sub, islands, s, self%previous(s)%value, value)
+        else
+          call add_contacts(part, problem%kernels, sub, islands, s, sub%impulse, value)
+        end if
+        if (allocated(part%load)) then
+          call add_bodies(sub, problem%nd, part, part%load, islands%part(s), value)
+        else
+          call add_bodies(sub, problem%nd, part, sub%reaction, islands%part(s), value)
+        end if
+      end associate
     end do
     call islands%complete(problem, n_island_sums, sums)
     error = 0.0_dp
@@ -244,9 +245,10 @@ contains
   end function test_impulses_project_islands
 
   !> Add what the contacts of islands say: y . w of the tests, and twice the power of impulses on shifts.
-  subroutine add_contacts(self, problem, islands, s, previous, sums)
-    class(test_impulses_t), intent(in) :: self
-    type(contact_problem_t), intent(in) :: problem
+  subroutine add_contacts(part, kernels, sub, islands, s, previous, sums)
+    type(test_part_t), intent(in) :: part
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
     type(islands_t), intent(in) :: islands
     !> number of the subdomain on this rank
     integer, intent(in) :: s
@@ -255,10 +257,10 @@ contains
     !> (n_island_sums, islands)
     real(dp), intent(inout), contiguous :: sums(:, :)
 
-    if (allocated(self%part(s)%on_bodies)) then
-      call add_with(self%part(s)%on_bodies)
+    if (allocated(part%on_bodies)) then
+      call add_with(part%on_bodies)
     else
-      call add_with(problem%sub(s)%impulse)
+      call add_with(sub%impulse)
     end if
 
   contains
@@ -271,30 +273,28 @@ contains
       real(dp) :: powers(lanes, n_tests + 1, together)
       integer :: from, to, c, i, q, g, island(lanes*together)
 
-      associate (sub => problem%sub(s), shift => problem%kernels%row%shift)
-        do from = 1, size(sub%hot, 3), together
-          to = min(from + together - 1, size(sub%hot, 3))
-          island(:) = 0
-          do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
-            i = islands%of_contact(s, sub, c)
-            if (i == 0) cycle
-            if (islands%part(s)%is_small(i)) island(c - (from - 1)*lanes) = i
-          end do
-          if (.not. any(island > 0)) cycle
-          call problem%kernels%find_powers(sub%pair(:, (from - 1)*lanes + 1:to*lanes), sub%hot(:, :, from:to), &
-            & sub%inverse_mass, sub%v_global, sub%impulse(:, :, from:to), on_bodies(:, :, from:to), previous(:, :, from:to), &
-            & powers(:, :, 1:to - from + 1))
-          do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
-            i = island(c - (from - 1)*lanes)
-            if (i == 0) cycle
-            q = lane_of(c)
-            g = block_of(c)
-            sums(1:n_tests, i) = sums(1:n_tests, i) + powers(q, 1:n_tests, g - from + 1)
-            sums(at_terms, i) = sums(at_terms, i) + powers(q, n_tests + 1, g - from + 1)
-            sums(at_rest, i) = sums(at_rest, i) + 2.0_dp*sub%impulse(q, 1, g)*sub%hot(q, shift, g)
-          end do
+      do from = 1, size(sub%hot, 3), together
+        to = min(from + together - 1, size(sub%hot, 3))
+        island(:) = 0
+        do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
+          i = islands%of_contact(s, sub, c)
+          if (i == 0) cycle
+          if (islands%part(s)%is_small(i)) island(c - (from - 1)*lanes) = i
         end do
-      end associate
+        if (.not. any(island > 0)) cycle
+        call kernels%find_powers(sub%pair(:, (from - 1)*lanes + 1:to*lanes), sub%hot(:, :, from:to), &
+          & sub%inverse_mass, sub%v_global, sub%impulse(:, :, from:to), on_bodies(:, :, from:to), previous(:, :, from:to), &
+          & powers(:, :, 1:to - from + 1))
+        do c = (from - 1)*lanes + 1, min(to*lanes, sub%n_contacts)
+          i = island(c - (from - 1)*lanes)
+          if (i == 0) cycle
+          q = lane_of(c)
+          g = block_of(c)
+          sums(1:n_tests, i) = sums(1:n_tests, i) + powers(q, 1:n_tests, g - from + 1)
+          sums(at_terms, i) = sums(at_terms, i) + powers(q, n_tests + 1, g - from + 1)
+          sums(at_rest, i) = sums(at_rest, i) + 2.0_dp*sub%impulse(q, 1, g)*sub%hot(q, kernels%nd + 1, g)
+        end do
+      end do
     end subroutine add_with
 
   end subroutine add_contacts
@@ -339,9 +339,9 @@ contains
 
     if (.not. allocated(part%local)) then
       associate (blocks => size(sub%hot, 3))
-        allocate (part%local(problem%kernels%nv, sub%n_columns), part%recent(problem%kernels%nv, sub%n_columns))
+        allocate (part%local(problem%nv, sub%n_columns), part%recent(problem%nv, sub%n_columns))
         allocate (power(lanes, blocks))
-        allocate (part%kept(lanes, problem%kernels%nc, merge(blocks, 0, problem%cell%is_driven)))
+        allocate (part%kept(lanes, problem%nc, merge(blocks, 0, problem%cell_is_driven())))
       end associate
     end if
     part%local(:, :) = 0.0_dp
@@ -358,10 +358,10 @@ contains
     part%load = sub%reaction + sub%attraction_load
   end subroutine take_attractions_off
 
-  !> Add what the contacts of subdomain `s` of this rank say.
-  subroutine test(problem, s, part, previous, power, sums, largest)
-    type(contact_problem_t), intent(in) :: problem
-    integer, intent(in) :: s
+  !> Add what the contacts of a subdomain say.
+  subroutine test(kernels, sub, part, previous, power, sums, largest)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
     type(test_part_t), intent(inout) :: part
     !> earlier impulses (lanes, nc, blocks) [N s]
     real(dp), intent(in), contiguous :: previous(:, :, :)
@@ -374,7 +374,7 @@ contains
     if (allocated(part%on_bodies)) then
       call test_with(part%on_bodies)
     else
-      call test_with(problem%sub(s)%impulse)
+      call test_with(sub%impulse)
     end if
 
   contains
@@ -384,13 +384,11 @@ contains
       real(dp), intent(in), contiguous :: on_bodies(:, :, :)
       real(dp) :: found(3 + n_tests)
 
-      associate (sub => problem%sub(s))
-        call problem%kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, on_bodies, previous, &
-          & power, part%local, part%recent, part%kept, found, largest)
-        sums(1:3) = found(1:3)
-        sums(at_powers + 1:at_products) = found(4:)
-        if (problem%cell%is_driven) call find_virials(sub, problem%kernels%nf, part%kept, on_bodies, previous, sums(n_sums + 1:))
-      end associate
+      call kernels%make_tests(sub%pair, sub%hot, sub%inverse_mass, sub%v_global, sub%impulse, on_bodies, previous, &
+        & power, part%local, part%recent, part%kept, found, largest)
+      sums(1:3) = found(1:3)
+      sums(at_powers + 1:at_products) = found(4:)
+      if (size(part%kept, 3) > 0) call find_virials(sub, kernels%nf, part%kept, on_bodies, previous, sums(n_sums + 1:))
     end subroutine test_with
 
   end subroutine test
@@ -414,16 +412,16 @@ contains
   end subroutine find_virials
 
   !> Add to the products of the velocities of tests what the cell has of them.
-  pure subroutine add_cell(problem, virials, products)
-    type(contact_problem_t), intent(in) :: problem
+  pure subroutine add_cell(motion, virials, products)
+    type(cell_motion_t), intent(in) :: motion
     !> (components that stresses drive, tests) [N m s]
-    real(dp), intent(in) :: virials(count(problem%cell%driven), n_tests)
+    real(dp), intent(in) :: virials(count(motion%driven), n_tests)
     !> columns of the upper triangle of G [J]
     real(dp), intent(inout), contiguous :: products(:)
     real(dp) :: inertia(size(virials, 1))
     integer :: i, j, k, at
 
-    inertia(:) = pack(problem%cell%inertia, problem%cell%driven)
+    inertia(:) = pack(motion%inertia, motion%driven)
     at = 0
     do j = 1, n_tests
       do i = 1, j

@@ -15,7 +15,8 @@
 module gravier_vain_impulses
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lane_of, block_of, project_on_cones
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_kept_impulses, only: kept_impulses_t, copy_impulses, restore_impulses
   implicit none
   private
@@ -53,7 +54,7 @@ contains
   real(dp) function speed_against(problem) result(speed)
     type(contact_problem_t), intent(in) :: problem
     real(dp), allocatable :: prescribed(:, :), v(:, :, :), now(:, :, :)
-    real(dp) :: z(problem%kernels%nf), impulse
+    real(dp) :: z(problem%nf), impulse
     integer :: s, b, c, d
 
     speed = 0.0_dp
@@ -67,8 +68,8 @@ contains
             if (.not. sub%moves(d, b)) prescribed(d, b) = sub%v_free(d, b)
           end do
         end do
-        call kernels%contact_velocity(sub%pair, sub%hot, prescribed, v)
-        call kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, now)
+        call sub%contact_velocity(kernels, prescribed, v)
+        call sub%contact_velocity(kernels, sub%v_global, now)
         do c = 1, sub%n_contacts
           associate (contact => sub%hot(lane_of(c), :, block_of(c)))
             z(:) = sub%impulse(lane_of(c), 1:kernels%nf, block_of(c))
@@ -121,17 +122,17 @@ contains
 
     ! boundaries that forces move along some axes move as prescribed along the others
     do b = sub%n_grains + 1, sub%n_columns
-      do d = 1, problem%kernels%nv
+      do d = 1, problem%nv
         if (.not. sub%moves(d, b)) work = work - sub%reaction(d, b)*sub%v_free(d, b)
       end do
     end do
     do c = 1, sub%n_contacts
-      associate (z => sub%impulse(lane_of(c), 1:problem%kernels%nf, block_of(c)))
+      associate (z => sub%impulse(lane_of(c), 1:problem%nf, block_of(c)))
         work = work - work_of_shift(problem, sub%hot(lane_of(c), :, block_of(c)), z)
       end associate
     end do
     if (.not. allocated(sub%spring)) return
-    associate (row => problem%kernels%row, nd => problem%kernels%nd)
+    associate (row => problem%row, nd => problem%nd)
       do c = 1, sub%n_contacts
         associate (z => sub%impulse(lane_of(c), :, block_of(c)), contact => sub%hot(lane_of(c), :, block_of(c)))
           work = work - z(1)*contact(row%compliance_n)*r(lane_of(c), 1, block_of(c)) &
@@ -149,7 +150,7 @@ contains
     !> impulse [N s]
     real(dp), intent(in) :: z(:)
 
-    associate (row => problem%kernels%row)
+    associate (row => problem%row)
       work = z(1)*contact(row%shift)
       if (row%shift_t > 0) work = work + sum(z(2:)*contact(row%shift_t:row%shift_t + size(z) - 2))
     end associate
@@ -161,13 +162,13 @@ contains
     type(contact_problem_t), intent(in) :: problem
     type(subproblem_t), intent(in) :: sub
     real(dp), intent(inout) :: total, fastest
-    real(dp) :: reaction(problem%kernels%nd), speed
+    real(dp) :: reaction(problem%nd), speed
     integer :: b, c, nd
 
-    nd = problem%kernels%nd
-    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring) .or. problem%cell%moves)
-      if (.not. (sub%yields(c) .or. problem%cell%moves)) cycle
-      fastest = max(fastest, abs(sub%hot(lane_of(c), problem%kernels%row%shift, block_of(c))))
+    nd = problem%nd
+    do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring) .or. problem%cell_moves())
+      if (.not. (sub%yields(c) .or. problem%cell_moves())) cycle
+      fastest = max(fastest, abs(sub%hot(lane_of(c), problem%row%shift, block_of(c))))
     end do
     do b = 1, sub%n_columns
       speed = norm2(sub%v_free(1:nd, b))

@@ -116,7 +116,7 @@ contains
     parts(:, :) = 0.0_dp
     moves = .false.
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         do b = 1, sub%n_bodies
           heavy = inverse_of_translation(sub%inverse_mass(:, b), nd)
           if (.not. heavy > 0.0_dp) cycle
@@ -129,13 +129,13 @@ contains
         end do
         do b = sub%n_grains + 1, sub%n_columns
           ! boundaries that forces move along some axes move as prescribed along the others
-          do d = 1, problem%kernels%nv
+          do d = 1, problem%nv
             moves = moves .or. (abs(sub%v_free(d, b)) > 0.0_dp .and. .not. sub%moves(d, b))
           end do
         end do
         if (sub%n_contacts > 0) moves = moves .or. any(sub%hot(:, nd + 1, :) < 0.0_dp)
-        if (problem%kernels%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
-          & any(abs(sub%hot(:, problem%kernels%shift_row + 1:problem%kernels%shift_row + nd - 1, :)) > 0.0_dp)
+        if (problem%shift_row > 0 .and. sub%n_contacts > 0) moves = moves .or. &
+          & any(abs(sub%hot(:, problem%shift_row + 1:problem%shift_row + nd - 1, :)) > 0.0_dp)
       end associate
     end do
     call problem%comm%sum_parts(parts, sums)
@@ -182,7 +182,7 @@ contains
 
     fastest = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         do b = 1, sub%n_bodies
           rim = 0.0_dp
           if (b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_global(nd + 1:, b))
@@ -298,7 +298,7 @@ contains
       if (self%is_restless) limit = speed_at_rest
     end if
     ! the motion of a cell that stresses drive joins all bodies
-    if ((self%is_restless .or. self%bound_by_rest > self%most_at_rest) .and. .not. problem%cell%is_driven) then
+    if ((self%is_restless .or. self%bound_by_rest > self%most_at_rest) .and. .not. problem%cell_is_driven()) then
       self%projection_of_islands = self%tests%project_islands(problem, method, self%iterations, self%mass)
       if (self%criterion() > self%allowed) return
     end if

@@ -6,7 +6,10 @@
 module gravier_ways
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: lanes
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_communicator, only: communicator_t
+  use gravier_shared_exchange, only: shared_exchange_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: ways_t, list_closed, shorten_ways, unreached
@@ -23,6 +26,8 @@ module gravier_ways
     real(dp), allocatable :: length(:)
     !> contacts that press or are closed
     integer :: n_closed = 0
+    !> bodies that may move: the first columns
+    integer, private :: n_bodies = 0
     !> where the neighbours of each body over such contacts begin, to `first(b + 1) - 1` (n_columns + 1); these, and the lengths of
     !> the ways to them (2 n_closed)
     integer, allocatable, private :: first(:), neighbour(:)
@@ -53,8 +58,9 @@ contains
         allocate (ways(s)%open(sub%n_columns), ways(s)%waits(sub%n_columns), source=.false.)
         allocate (pair(2, sub%n_contacts), step(sub%n_contacts))
         n = 0
-        if (sub%n_contacts > 0) call take_closed(sub, problem%kernels%nd + 1, closed, n, pair, step, unit)
+        if (sub%n_contacts > 0) call take_closed(sub, problem%nd + 1, closed, n, pair, step, unit)
         ways(s)%n_closed = n
+        ways(s)%n_bodies = sub%n_bodies
         call list_by_body(pair(:, 1:n), step(1:n), ways(s))
         deallocate (pair, step)
       end associate
@@ -133,8 +139,9 @@ contains
   end subroutine list_by_body
 
   !> Find the ways of all bodies that have none yet, from those whose length is known. Collective.
-  subroutine shorten_ways(problem, ways)
-    type(contact_problem_t), intent(inout) :: problem
+  subroutine shorten_ways(comm, shared, ways)
+    type(communicator_t), intent(in) :: comm
+    type(shared_exchange_t), intent(inout) :: shared
     type(ways_t), intent(inout) :: ways(:)
     real(dp), allocatable :: field(:, :)
     integer :: s, j, b
@@ -143,28 +150,28 @@ contains
     shares = .false.
     do s = 1, size(ways)
       ways(s)%open(:) = ways(s)%length >= unreached
-      ways(s)%open(problem%sub(s)%n_bodies + 1:) = .false.
+      ways(s)%open(ways(s)%n_bodies + 1:) = .false.
       ways(s)%waits(:) = ways(s)%length < unreached
-      shares = shares .or. problem%shared%part(s)%n_slots > 0
+      shares = shares .or. shared%n_shared(s) > 0
       call shorten_own(ways(s))
     end do
-    if (.not. problem%comm%any_true(shares)) return
+    if (.not. comm%any_true(shares)) return
     do
       do s = 1, size(ways)
-        allocate (field(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
+        allocate (field(shared%width, size(ways(s)%length)), source=0.0_dp)
         field(1, :) = ways(s)%length
-        call problem%shared%load(s, field)
+        call shared%load(s, field)
         deallocate (field)
       end do
-      call problem%shared%pass()
+      call shared%pass()
       changed = .false.
       do s = 1, size(ways)
-        associate (shared => problem%shared%part(s), this => ways(s))
+        associate (copies => shared%part(s), this => ways(s))
           shares = .false.
-          do j = 1, shared%n_slots
-            b = shared%slot_body(j)
-            if (.not. (this%open(b) .and. shared%recv(1, j) < this%length(b))) cycle
-            this%length(b) = shared%recv(1, j)
+          do j = 1, copies%n_slots
+            b = copies%slot_body(j)
+            if (.not. (this%open(b) .and. copies%recv(1, j) < this%length(b))) cycle
+            this%length(b) = copies%recv(1, j)
             this%waits(b) = .true.
             shares = .true.
           end do
@@ -172,7 +179,7 @@ contains
           changed = changed .or. shares
         end associate
       end do
-      if (.not. problem%comm%any_true(changed)) exit
+      if (.not. comm%any_true(changed)) exit
     end do
   end subroutine shorten_ways
 

@@ -5,7 +5,7 @@
 module gravier_contact_data
   implicit none
   private
-  public :: lanes, n_blocks, block_of, lane_of, contact_rows_t
+  public :: lanes, n_blocks, block_of, lane_of, contact_rows_t, packed_layout_t
   public :: rows_2d_frictionless, rows_2d_friction, rows_2d_friction_shift, rows_2d_friction_rolling
   public :: rows_2d_friction_shift_rolling, rows_2d_shaped, rows_2d_shaped_shift
   public :: rows_3d_frictionless, rows_3d_friction, rows_3d_friction_shift, rows_3d_friction_rolling
@@ -50,6 +50,23 @@ module gravier_contact_data
     !> compliances a along the normal and the tangents, 0 of a rigid contact: the law holds for v + shift + a r [1/kg]
     integer :: compliance_n = 0, compliance_t = 0
   end type contact_rows_t
+
+  !> The layout of the packed arrays, which dimension and effects of a scene fix for a whole run. The loops have it, and so has the
+  !> contact problem, whose arrays they work on.
+  type :: packed_layout_t
+    !> space dimension, degrees of freedom of a body, rows of `weight`, components of an impulse, those of them that are a
+    !> force's (the first ones; the others are moments), rows of `hot`
+    integer :: nd = 2, nv = 2, nw = 2, nc = 1, nf = 1, nh = 4
+    !> row of `hot` that holds mu, and the rows before the tangential shift and before those of the rolling law; 0 where the
+    !> kernels have no such effect
+    integer :: friction_row = 0, shift_row = 0, rolling_row = 0
+    !> all rows of `hot` by name
+    type(contact_rows_t) :: row
+  contains
+    procedure :: has_shapes => packed_layout_has_shapes
+    procedure :: has_rolling => packed_layout_has_rolling
+    procedure :: has_compliance => packed_layout_has_compliance
+  end type packed_layout_t
 
   type(contact_rows_t), parameter :: rows_2d_frictionless = contact_rows_t(total=4, nx=1, ny=2, shift=3, per_wnn=4)
   type(contact_rows_t), parameter :: rows_2d_friction = &
@@ -126,5 +143,23 @@ contains
     integer, intent(in) :: c
     lane_of = mod(c - 1, lanes) + 1
   end function lane_of
+
+  !> Whether bodies may have shapes, so that contacts have arms instead of levers.
+  pure logical function packed_layout_has_shapes(self) result(has_shapes)
+    class(packed_layout_t), intent(in) :: self
+    has_shapes = self%row%arm_i > 0
+  end function packed_layout_has_shapes
+
+  !> Whether contacts resist rolling, so that impulses have moments.
+  pure logical function packed_layout_has_rolling(self) result(has_rolling)
+    class(packed_layout_t), intent(in) :: self
+    has_rolling = self%row%rolling_radius > 0
+  end function packed_layout_has_rolling
+
+  !> Whether contacts may be compliant.
+  pure logical function packed_layout_has_compliance(self) result(has_compliance)
+    class(packed_layout_t), intent(in) :: self
+    has_compliance = self%row%compliance_n > 0
+  end function packed_layout_has_compliance
 
 end module gravier_contact_data

@@ -24,9 +24,9 @@
 !> A compliant contact yields by a r: its law holds for v + shift + a r, and its local operators are W + a.
 module gravier_contact_kernels
   use gravier_effects, only: effects_t
-  use gravier_contact_data, only: contact_rows_t, lanes, n_blocks, block_of, lane_of, rows_2d_frictionless, rows_2d_friction, &
-    & rows_2d_friction_shift, rows_2d_friction_rolling, rows_2d_friction_shift_rolling, rows_3d_frictionless, rows_3d_friction, &
-    & rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling, &
+  use gravier_contact_data, only: contact_rows_t, packed_layout_t, lanes, n_blocks, block_of, lane_of, &
+    & rows_2d_frictionless, rows_2d_friction, rows_2d_friction_shift, rows_2d_friction_rolling, rows_2d_friction_shift_rolling, &
+    & rows_3d_frictionless, rows_3d_friction, rows_3d_friction_shift, rows_3d_friction_rolling, rows_3d_friction_shift_rolling, &
     & rows_2d_shaped, rows_2d_shaped_shift, rows_3d_shaped, rows_3d_shaped_shift, rows_2d_compliant, rows_2d_compliant_rolling, &
     & rows_2d_shaped_compliant, rows_3d_compliant, rows_3d_compliant_rolling, rows_3d_shaped_compliant
   use gravier_kernel_table, only: kernel_table_t
@@ -39,7 +39,7 @@ module gravier_contact_kernels
     & rolling_radius
   implicit none
   private
-  public :: kernels_t
+  public :: kernels_t, packed_layout_t
   ! this module is the door to the folder
   public :: lanes, n_blocks, block_of, lane_of, contact_jacobian, global_impulse, global_moment, tangents, local_operator
   public :: contact_tangents, project_tangential, tangential_vectors, project_on_cones, moment_vectors, project_moments

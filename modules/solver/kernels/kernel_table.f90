@@ -2,7 +2,7 @@
 !> arrays that they work on. The table is filled once a run (gravier_contact_kernels), so that no loop branches on options.
 module gravier_kernel_table
   use gravier_kinds, only: dp
-  use gravier_contact_data, only: contact_rows_t
+  use gravier_contact_data, only: packed_layout_t
   implicit none
   private
   public :: kernel_table_t
@@ -129,15 +129,7 @@ module gravier_kernel_table
     end subroutine powers_kernel
   end interface
 
-  type :: kernel_table_t
-    !> space dimension, degrees of freedom of a body, rows of `weight`, components of an impulse, those of them that are a
-    !> force's (the first ones; the others are moments), rows of `hot`
-    integer :: nd = 2, nv = 2, nw = 2, nc = 1, nf = 1, nh = 4
-    !> row of `hot` that holds mu, and the rows before the tangential shift and before those of the rolling law; 0 where the
-    !> kernels have no such effect
-    integer :: friction_row = 0, shift_row = 0, rolling_row = 0
-    !> all rows of `hot` by name
-    type(contact_rows_t) :: row
+  type, extends(packed_layout_t) :: kernel_table_t
     procedure(sweep_kernel), pointer, nopass :: sweep => null()
     procedure(recording_kernel), pointer, nopass :: sweep_recording => null()
     procedure(momentum_kernel), pointer, nopass :: sweep_momentum => null()

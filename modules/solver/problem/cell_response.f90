@@ -4,7 +4,8 @@ module gravier_cell_response
   use gravier_kinds, only: dp
   use gravier_periodic, only: gradient_times
   use gravier_contact_kernels, only: contact_tangents, lanes, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: start_response, respond, carry_along, image_velocity, subtract_images, virial_of
@@ -27,10 +28,10 @@ contains
   pure subroutine prepare(problem, sub)
     type(contact_problem_t), intent(in) :: problem
     type(subproblem_t), intent(inout) :: sub
-    real(dp) :: frame(problem%kernels%nd, problem%kernels%nd), added(problem%kernels%nd)
+    real(dp) :: frame(problem%nd, problem%nd), added(problem%nd)
     integer :: c, d, k, a, b
 
-    associate (row => problem%kernels%row, motion => problem%cell, nf => problem%kernels%nf)
+    associate (row => problem%row, motion => problem%cell, nf => problem%nf)
       allocate (sub%cell%free(lanes, nf, size(sub%hot, 3)), sub%cell%lever(lanes, nf, count(motion%driven), size(sub%hot, 3)), &
         & source=0.0_dp)
       do c = 1, sub%n_contacts
@@ -41,7 +42,7 @@ contains
             sub%cell%free(q, d, g) = sub%cell%shift(d, c) + sum(added*frame(:, d))
             sub%hot(q, merge(row%shift, row%shift_t + d - 2, d == 1), g) = sub%cell%free(q, d, g)
             k = 0
-            do b = 1, problem%kernels%nd
+            do b = 1, problem%nd
               do a = 1, b
                 if (.not. motion%driven(a, b)) cycle
                 k = k + 1
@@ -65,7 +66,7 @@ contains
     if (.not. problem%cell%is_driven) return
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
-        parts(:, s) = virial_of(sub, problem%kernels%nf, sub%impulse)
+        parts(:, s) = virial_of(sub, problem%nf, sub%impulse)
         if (.not. allocated(sub%attraction)) cycle
         do k = 1, size(parts, 1)
           parts(k, s) = parts(k, s) - sum(sub%attraction*sub%cell%lever(:, 1, k, :))
@@ -74,7 +75,7 @@ contains
     end do
     call problem%comm%sum_parts(parts, virial)
     k = 0
-    do b = 1, problem%kernels%nd
+    do b = 1, problem%nd
       do a = 1, b
         if (.not. problem%cell%driven(a, b)) cycle
         k = k + 1
@@ -83,8 +84,8 @@ contains
       end do
     end do
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), row => problem%kernels%row)
-        call set_shifts(sub, problem%kernels%nf, row%shift, row%shift_t, change)
+      associate (sub => problem%sub(s), row => problem%row)
+        call set_shifts(sub, problem%nf, row%shift, row%shift_t, change)
       end associate
     end do
   end subroutine respond
@@ -133,10 +134,10 @@ contains
   !> Carry the grains of a solved problem along with the change of the cell's velocity: v_global is theirs then.
   pure subroutine carry_along(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: change(3, 3), carried(problem%kernels%nd)
+    real(dp) :: change(3, 3), carried(problem%nd)
     integer :: s, b, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     change(:, :) = problem%cell%now - problem%cell%before
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -172,12 +173,12 @@ contains
     integer, intent(in) :: s
     !> H^T V (lanes, nc, blocks) [m/s]
     real(dp), intent(inout), contiguous :: v(:, :, :)
-    real(dp) :: image(problem%kernels%nd)
+    real(dp) :: image(problem%nd)
     integer :: c
 
     do c = 1, problem%sub(s)%n_contacts
-      image(:) = image_velocity(problem%sub(s), problem%kernels%nd, c, problem%cell%now)
-      associate (nf => problem%kernels%nf, q => lane_of(c), g => block_of(c))
+      image(:) = image_velocity(problem%sub(s), problem%nd, c, problem%cell%now)
+      associate (nf => problem%nf, q => lane_of(c), g => block_of(c))
         v(q, 1:nf, g) = v(q, 1:nf, g) - image(1:nf)
       end associate
     end do

@@ -22,7 +22,7 @@ contains
     real(dp) :: normal(kernels%nd)
     integer :: nd, i, j, q, g
 
-    if (kernels%row%arm_i > 0) then
+    if (kernels%has_shapes()) then
       call operator_between_shapes(kernels, pair, hot, c, weight, w)
       return
     end if

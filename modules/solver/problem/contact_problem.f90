@@ -5,13 +5,14 @@ module gravier_contact_problem
   use gravier_timers, only: start_timer, stop_timer, phase_reduction
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_exchange_t
-  use gravier_body_mass, only: add_inverse_mass, apply_inverse_mass, can_move, mass_product, multiply_mass, velocities_under
-  use gravier_contact_spring, only: spring_step_t
-  use gravier_moving_cell, only: cell_motion_t, cell_contacts_t
-  use gravier_contact_kernels, only: kernels_t, global_impulse, lanes, lane_of, block_of
+  use gravier_body_mass, only: add_inverse_mass, velocities_under
+  use gravier_moving_cell, only: cell_motion_t
+  use gravier_subproblem, only: subproblem_t
+  use gravier_effects, only: effects_t
+  use gravier_contact_kernels, only: kernels_t, packed_layout_t, global_impulse, lanes, lane_of, block_of
   implicit none
   private
-  public :: subproblem_t, contact_problem_t, n_residual_sums
+  public :: contact_problem_t, n_residual_sums
 
   !> sums that a residual is made of, see `take_residual`
   integer, parameter :: n_residual_sums = 4
@@ -19,96 +20,9 @@ module gravier_contact_problem
   !> a defect of so many roundings of the largest term of R^d, a contact, is none
   real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
 
-  !> The contacts of one subdomain and the bodies they touch, packed in sweep order. Bodies 1 to n_grains are free
-  !> grains, up to n_bodies follow boundaries that forces move, up to n_columns what moves as prescribed. Grains that sleep are
-  !> among the last: they stand still.
-  !>
-  !> Attractions F of contacts are loads of the solve, and unilateral contact holds for r~_n = r_n + h F. `impulse`, `reaction` and
-  !> `v_free` are always those of the solve, r~ and its loads, in the solve and after it. The impulse r on the bodies and what
-  !> belongs to it are asked of `normal_impulse`, `contact_reaction`, `free_velocity` and `impulse_on_candidate`.
-  type :: subproblem_t
-    !> global number of the subdomain, from 1
-    integer :: subdomain = 0
-    integer :: n_grains = 0, n_bodies = 0, n_columns = 0, n_contacts = 0
-    !> contacts in whole blocks without common bodies: the first ones
-    integer :: n_grouped = 0
-    !> pairs of pieces of bodies with shapes whose cores overlap: by more than both roundings
-    integer :: overlapping_cores = 0
-    !> points in which bodies touch, but for which their pairs have no place
-    integer :: points_left_out = 0
-    !> contacts whose intact bond is stretched
-    integer :: stretched_bonds = 0
-    !> identifiers (n_columns)
-    integer(i8), allocatable :: id(:)
-    !> subdomain that holds the centre of each grain, or keeps account of a boundary (n_bodies)
-    integer, allocatable :: owner(:)
-    !> place of each grain among those owned by this subdomain, 0 for those owned elsewhere (n_grains)
-    integer, allocatable :: place(:)
-    !> subdomains in which each body carries contacts (n_bodies)
-    integer, allocatable :: multiplicity(:)
-    !> factor of the mass of each body in the velocity error, where slow bodies are beside fast ones; not allocated: 1 (n_bodies)
-    real(dp), allocatable :: concern(:)
-    !> number of the boundary behind a column, 0 for a grain that sleeps (n_grains + 1 to n_columns)
-    integer, allocatable :: boundary(:)
-    !> of grains (n_grains) [m]
-    real(dp), allocatable :: radius(:)
-    !> of grains, where a force acts on their volume (n_grains) [m^3, m^2 in 2D]
-    real(dp), allocatable :: volume(:)
-    !> what the applied forces of a loop of the user's own add to the velocity of grains, where there are such (nd, n_grains) [m/s]
-    real(dp), allocatable :: applied(:, :)
-    !> velocity without contacts, M^-1 R^d, with attractions among the loads (nv, n_columns) [m/s, rad/s]
-    real(dp), allocatable :: v_free(:, :)
-    !> largest of the terms of R^d, momenta at the start of the step and impulses of loads but attractions, of a body [N s]
-    real(dp) :: largest_term = 0.0_dp
-    !> velocity under the method's present loads (nv, n_columns)
-    real(dp), allocatable :: velocity(:, :)
-    !> velocity of the undivided bodies under all impulses (nv, n_columns), made by `evaluate`
-    real(dp), allocatable :: v_global(:, :)
-    !> H r~ (nv, n_columns), of all copies after `evaluate`; work space of methods [N s, N m s]
-    real(dp), allocatable :: reaction(:, :)
-    !> 1/m along each axis and, where bodies turn, 1/I of the undivided bodies, 0 for what cannot move (gravier_body_mass)
-    !> (nw, n_columns)
-    real(dp), allocatable :: inverse_mass(:, :)
-    !> the same as the method divides masses among copies (nw, n_columns)
-    real(dp), allocatable :: weight(:, :)
-    !> (2, lanes*blocks), (lanes, nh, blocks), (lanes, nc, blocks): see gravier_contact_kernels
-    integer, allocatable :: pair(:, :)
-    real(dp), allocatable :: hot(:, :, :)
-    !> r~, of which a normal part above 0 says that the bodies touch
-    real(dp), allocatable :: impulse(:, :, :)
-    !> where some law of the scene attracts: h F of the attraction F of each contact (lanes, blocks) [N s], and their load on the
-    !> bodies, H (-h F n), of all copies (nv, n_columns) [N s, N m s]
-    real(dp), allocatable :: attraction(:, :), attraction_load(:, :)
-    !> where some law of the scene has springs: those of each contact (n_contacts)
-    type(spring_step_t), allocatable :: spring(:)
-    !> where some law of the scene has bonds: whether an intact one holds the contact (n_contacts)
-    logical, allocatable :: joins(:)
-    !> largest product of the step and the frequency sqrt(k W_nn) of a normal spring
-    real(dp) :: stiffest = 0.0_dp
-    !> compliant contacts that are pressed together, and the sum of h^2 k W_nn over them, of which only so much counts
-    integer :: n_springs = 0
-    real(dp) :: stiffness = 0.0_dp
-    !> gap at q_m (n_contacts) [m]
-    real(dp), allocatable :: gap(:)
-    !> place of each contact in the neighbour list (n_contacts)
-    integer, allocatable :: source(:)
-    !> where the periodic cell moves
-    type(cell_contacts_t) :: cell
-  contains
-    procedure :: share_masses => subproblem_share_masses
-    procedure :: update_local_operator => subproblem_update_local_operator
-    procedure :: moves => subproblem_moves
-    procedure :: multiply_mass => subproblem_multiply_mass
-    procedure :: product_of => subproblem_product_of
-    procedure :: normal_impulse => subproblem_normal_impulse
-    procedure :: yields => subproblem_yields
-    procedure :: is_bonded => subproblem_is_bonded
-    procedure :: overlap => subproblem_overlap
-    procedure :: contact_reaction => subproblem_contact_reaction
-    procedure :: free_velocity => subproblem_free_velocity
-  end type subproblem_t
-
-  type :: contact_problem_t
+  !> The subproblems of a rank and what they have in common. The layout of their arrays is that of the kernels, with which
+  !> `take_kernels` and `choose_kernels` set it.
+  type, extends(packed_layout_t) :: contact_problem_t
     type(communicator_t), pointer :: comm => null()
     type(kernels_t) :: kernels
     !> subdomains of this rank
@@ -149,6 +63,10 @@ module gravier_contact_problem
     !> [m/s]
     real(dp) :: drive_scale = huge(1.0_dp)
   contains
+    procedure :: choose_kernels => contact_problem_choose_kernels
+    procedure :: take_kernels => contact_problem_take_kernels
+    procedure :: cell_moves => contact_problem_cell_moves
+    procedure :: cell_is_driven => contact_problem_cell_is_driven
     procedure :: evaluate => contact_problem_evaluate
     procedure :: residual => contact_problem_residual
     procedure :: take_residual => contact_problem_take_residual
@@ -164,138 +82,38 @@ module gravier_contact_problem
 
 contains
 
-  !> Set the masses that sweeps work with: undivided, or shared equally between the copies, M~ = M/m (7)-(8).
-  subroutine subproblem_share_masses(self, kernels, shared)
-    class(subproblem_t), intent(inout) :: self
+  !> Choose the loops for a dimension and the effects that the scene has, and with them the layout of the packed arrays.
+  subroutine contact_problem_choose_kernels(self, dimension, effects)
+    class(contact_problem_t), intent(inout) :: self
+    !> 2 or 3
+    integer, intent(in) :: dimension
+    type(effects_t), intent(in) :: effects
+    type(kernels_t) :: kernels
+
+    call kernels%choose(dimension, effects)
+    call self%take_kernels(kernels)
+  end subroutine contact_problem_choose_kernels
+
+  !> Take loops that are chosen, and with them the layout of the packed arrays.
+  pure subroutine contact_problem_take_kernels(self, kernels)
+    class(contact_problem_t), intent(inout) :: self
     type(kernels_t), intent(in) :: kernels
-    logical, intent(in) :: shared
-    integer :: b
 
-    self%weight(:, :) = self%inverse_mass
-    if (shared) then
-      do b = 1, self%n_bodies
-        self%weight(:, b) = self%multiplicity(b)*self%inverse_mass(:, b)
-      end do
-    end if
-    call self%update_local_operator(kernels)
-  end subroutine subproblem_share_masses
+    self%kernels = kernels
+    self%packed_layout_t = kernels%packed_layout_t
+  end subroutine contact_problem_take_kernels
 
-  !> Inverse diagonal of the local operators from `weight`, into the contact data.
-  pure subroutine subproblem_update_local_operator(self, kernels, factors)
-    class(subproblem_t), intent(inout) :: self
-    type(kernels_t), intent(in) :: kernels
-    !> relaxation factors of local solves in sweeps, of the normal, tangential and rolling part; 1 if absent
-    real(dp), intent(in), optional :: factors(3)
-    real(dp) :: taken(3)
+  !> Whether the periodic cell moves in this step.
+  pure logical function contact_problem_cell_moves(self) result(moves)
+    class(contact_problem_t), intent(in) :: self
+    moves = self%cell%moves
+  end function contact_problem_cell_moves
 
-    if (self%n_contacts == 0) return
-    taken(:) = 1.0_dp
-    if (present(factors)) taken(:) = factors
-    call kernels%set_operators(self%pair, self%hot, self%weight, taken)
-    ! contacts of no effect are all zero
-    self%hot(lane_of(self%n_contacts) + 1:, :, block_of(self%n_contacts)) = 0.0_dp
-  end subroutine subproblem_update_local_operator
-
-  !> Whether degree of freedom `d` of body `b` can move.
-  pure logical function subproblem_moves(self, d, b) result(moves)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: d, b
-    moves = can_move(self%inverse_mass(:, b), d)
-  end function subproblem_moves
-
-  !> v := M v of body `b` with the masses in `weight`; 0 for components that cannot move.
-  pure subroutine subproblem_multiply_mass(self, b, v)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: b
-    !> (nv) [m/s, rad/s] in, [N s, N m s] out
-    real(dp), intent(inout), contiguous :: v(:)
-
-    call multiply_mass(self%inverse_mass(:, b), self%weight(:, b), v)
-  end subroutine subproblem_multiply_mass
-
-  !> (a, b)_M of two velocities of the bodies that can move, a copy of a shared body counting with its part [J].
-  pure real(dp) function subproblem_product_of(self, a, b) result(total)
-    class(subproblem_t), intent(in) :: self
-    !> (nv, n_columns)
-    real(dp), intent(in), contiguous :: a(:, :), b(:, :)
-    integer :: k
-
-    total = 0.0_dp
-    do k = 1, self%n_bodies
-      total = total + mass_product(self%inverse_mass(:, k), a(:, k), b(:, k))/self%multiplicity(k)
-    end do
-  end function subproblem_product_of
-
-  !> Normal impulse of contact `c` on its candidate, r_n = r~_n - h F [N s]; below 0 where the attraction pulls more than the bodies
-  !> press.
-  pure real(dp) function subproblem_normal_impulse(self, c) result(impulse)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: c
-
-    impulse = self%impulse(lane_of(c), 1, block_of(c))
-    if (allocated(self%attraction)) impulse = impulse - self%attraction(lane_of(c), block_of(c))
-  end function subproblem_normal_impulse
-
-  !> Whether contact `c` is compliant: its overlap is deformation, and no error.
-  pure logical function subproblem_yields(self, c) result(yields)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: c
-
-    yields = .false.
-    if (allocated(self%spring)) yields = self%spring(c)%spring%yields()
-  end function subproblem_yields
-
-  !> Whether an intact bond holds contact `c`: its overlap is the length that it had when it was made, and no error.
-  pure logical function subproblem_is_bonded(self, c) result(is_bonded)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: c
-
-    is_bonded = .false.
-    if (allocated(self%joins)) is_bonded = self%joins(c)
-  end function subproblem_is_bonded
-
-  !> Largest overlap of the contacts that yield, or of those that are rigid and not bonded; 0 where there is none [m].
-  pure real(dp) function subproblem_overlap(self, yielding) result(overlap)
-    class(subproblem_t), intent(in) :: self
-    logical, intent(in) :: yielding
-    integer :: c
-
-    overlap = 0.0_dp
-    if (allocated(self%spring) .or. allocated(self%joins)) then
-      do c = 1, self%n_contacts
-        if (self%is_bonded(c)) cycle
-        if (self%yields(c) .eqv. yielding) overlap = max(overlap, -self%gap(c))
-      end do
-    else if (self%n_contacts > 0 .and. .not. yielding) then
-      overlap = max(overlap, -minval(self%gap))
-    end if
-    ! a zero without a sign, whichever of two zeros was larger
-    if (overlap <= 0.0_dp) overlap = 0.0_dp
-  end function subproblem_overlap
-
-  !> Impulse of all contacts on body `b`, component `d` of H r = H r~ - H h F n, once `evaluate` was called [N s, N m s].
-  pure real(dp) function subproblem_contact_reaction(self, d, b) result(reaction)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: d, b
-
-    reaction = self%reaction(d, b)
-    if (allocated(self%attraction_load)) reaction = reaction + self%attraction_load(d, b)
-  end function subproblem_contact_reaction
-
-  !> Velocity of body `b` without contacts and without their attractions, component `d` [m/s, rad/s].
-  pure real(dp) function subproblem_free_velocity(self, d, b) result(velocity)
-    class(subproblem_t), intent(in) :: self
-    integer, intent(in) :: d, b
-
-    !> most degrees of freedom of a body
-    real(dp) :: change(6)
-
-    velocity = self%v_free(d, b)
-    if (.not. allocated(self%attraction_load)) return
-    call apply_inverse_mass(self%inverse_mass(:, b), self%attraction_load(:, b), change(1:size(self%v_free, 1)))
-    ! the product is rounded by itself
-    velocity = velocity - change(d)
-  end function subproblem_free_velocity
+  !> Whether stresses drive the cell, so that its motion is found along with the impulses.
+  pure logical function contact_problem_cell_is_driven(self) result(is_driven)
+    class(contact_problem_t), intent(in) :: self
+    is_driven = self%cell%is_driven
+  end function contact_problem_cell_is_driven
 
   !> Impulse r of contact `c` of subdomain `s` of this rank on its candidate, in global axes [N s].
   pure subroutine contact_problem_impulse_on_candidate(self, s, c, p)
@@ -303,7 +121,7 @@ contains
     integer, intent(in) :: s, c
     !> (nd)
     real(dp), intent(out) :: p(:)
-    real(dp) :: impulse(lanes, self%kernels%nc, 1)
+    real(dp) :: impulse(lanes, self%nc, 1)
 
     associate (sub => self%sub(s), q => lane_of(c), g => block_of(c))
       impulse(q, :, 1) = sub%impulse(q, :, g)
@@ -320,7 +138,7 @@ contains
 
     do s = 1, size(self%sub)
       associate (sub => self%sub(s))
-        allocate (load(lanes, self%kernels%nc, size(sub%attraction, 2)), source=0.0_dp)
+        allocate (load(lanes, self%nc, size(sub%attraction, 2)), source=0.0_dp)
         load(:, 1, :) = -sub%attraction
         if (.not. allocated(sub%attraction_load)) allocate (sub%attraction_load, mold=sub%v_free)
         sub%attraction_load(:, :) = 0.0_dp
@@ -346,8 +164,7 @@ contains
     integer, intent(in) :: s
 
     associate (sub => self%sub(s))
-      sub%reaction(:, :) = 0.0_dp
-      call self%kernels%add_reaction(sub%pair, sub%hot, sub%impulse, sub%reaction)
+      call sub%react_to(self%kernels, sub%impulse)
     end associate
   end subroutine contact_problem_own_reactions
 
@@ -462,7 +279,7 @@ contains
     class(contact_problem_t), intent(in) :: self
     integer :: s, k, j, nd
 
-    nd = self%kernels%nd
+    nd = self%nd
     jump = 0.0_dp
     do s = 1, size(self%sub)
       associate (part => self%shared%part(s))

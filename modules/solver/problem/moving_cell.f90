@@ -31,6 +31,7 @@ module gravier_moving_cell
     real(dp) :: impulse(3, 3) = 0.0_dp
   contains
     procedure :: added => cell_motion_added
+    procedure :: n_driven => cell_motion_n_driven
   end type cell_motion_t
 
   !> What a subdomain knows of its contacts and grains in a cell that moves; not allocated in others.
@@ -44,9 +45,38 @@ module gravier_moving_cell
     !> what is added to the velocities where contacts do not move the cell, with the shift of the law (lanes, nf, blocks) [m/s]; and
     !> along n, t and s, l_b of each component ab that a stress drives (lanes, nf, components, blocks) [m]
     real(dp), allocatable :: free(:, :, :), lever(:, :, :, :)
+  contains
+    procedure :: init => cell_contacts_init
+    procedure :: keep_shift => cell_contacts_keep_shift
   end type cell_contacts_t
 
 contains
+
+  !> Room for so many contacts and grains.
+  pure subroutine cell_contacts_init(self, nd, n_contacts, n_grains)
+    class(cell_contacts_t), intent(inout) :: self
+    !> 2 or 3
+    integer, intent(in) :: nd
+    integer, intent(in) :: n_contacts, n_grains
+
+    allocate (self%branch(nd, n_contacts), self%way(nd, n_contacts), self%shift(nd, n_contacts))
+    allocate (self%place(nd, n_grains))
+  end subroutine cell_contacts_init
+
+  !> Where the cell moves, keep what the law alone adds to component `d` of the velocity of contact `c`.
+  pure subroutine cell_contacts_keep_shift(self, d, c, shift)
+    class(cell_contacts_t), intent(inout) :: self
+    integer, intent(in) :: d, c
+    !> [m/s]
+    real(dp), intent(in) :: shift
+    if (allocated(self%shift)) self%shift(d, c) = shift
+  end subroutine cell_contacts_keep_shift
+
+  !> Components of the gradient that stresses drive.
+  pure integer function cell_motion_n_driven(self) result(n_driven)
+    class(cell_motion_t), intent(in) :: self
+    n_driven = count(self%driven)
+  end function cell_motion_n_driven
 
   !> What a cell that has come to the gradient `g` adds to the velocity H^T V of a contact, V before grains are carried along [m/s].
   pure function cell_motion_added(self, g, branch, way) result(added)

@@ -41,8 +41,7 @@ contains
     integer :: i, j, nd
 
     nd = size(velocity)
-    i = view%list%candidate(p)
-    j = view%list%antagonist(p)
+    call view%find_ends(p, i, j)
     t = 0.5_dp*physics%h
     if (present(common)) then
       arm(:) = place%arm_j - place%arm_i
@@ -150,9 +149,11 @@ contains
     type(contact_place_t), intent(in) :: place
     real(dp), intent(out) :: spin(3)
     real(dp) :: v(3), axis(3), spins(3, 2), length
+    integer :: i, j
 
-    call find_spin(view, boundaries, view%list%candidate(p), spins(:, 1))
-    call find_spin(view, boundaries, view%list%antagonist(p), spins(:, 2))
+    call view%find_ends(p, i, j)
+    call find_spin(view, boundaries, i, spins(:, 1))
+    call find_spin(view, boundaries, j, spins(:, 2))
     call find_branch(view, physics, p, place, axis, v)
     length = max(norm2(axis), tiny(1.0_dp))
     axis(:) = axis/length
@@ -169,13 +170,14 @@ contains
     type(contact_place_t), intent(in) :: place
     real(dp), intent(out) :: branch(3), v(3)
     real(dp) :: other(3)
-    integer :: nd
+    integer :: i, j, nd
 
     nd = view%bodies%nd
     v(:) = 0.0_dp
     other(:) = 0.0_dp
-    v(1:nd) = view%bodies%velocity(1:nd, view%list%candidate(p))
-    other(1:nd) = view%bodies%velocity(1:nd, view%list%antagonist(p))
+    call view%find_ends(p, i, j)
+    v(1:nd) = view%bodies%velocity(1:nd, i)
+    other(1:nd) = view%bodies%velocity(1:nd, j)
     call add_image_velocity(view, p, other(1:nd))
     v(:) = v - other
     branch(:) = place%arm_j - place%arm_i - (1.0_dp - physics%theta)*physics%h*v

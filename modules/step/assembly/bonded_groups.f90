@@ -43,7 +43,7 @@ contains
     integer, allocatable :: bonds(:), root(:)
     integer :: f, i, j, n
 
-    allocate (bonds(view%bodies%n), root(view%bodies%n), groups%group(view%bodies%n), source=0)
+    allocate (bonds(view%n_bodies()), root(view%n_bodies()), groups%group(view%n_bodies()), source=0)
     do f = 1, found%n
       if (.not. is_first_bond(view, found, f)) cycle
       call find_ends(view, found, f, i, j)
@@ -195,8 +195,8 @@ contains
     integer, intent(in) :: f
     integer, intent(out) :: i, j
 
-    i = view%list%candidate(found%source(f))
-    j = max(view%list%antagonist(found%source(f)), 0)
+    call view%find_ends(found%source(f), i, j)
+    j = max(j, 0)
   end subroutine find_ends
 
   !> Whether contact `f` is a bond, and the first of its pair.
@@ -221,9 +221,7 @@ contains
     type(contact_list_t), intent(in) :: found
     integer, intent(in) :: other, f
 
-    associate (p => found%source(f), q => found%source(other))
-      same = view%list%candidate(p) == view%list%candidate(q) .and. view%list%antagonist(p) == view%list%antagonist(q)
-    end associate
+    same = view%list%same_bodies(found%source(f), found%source(other))
   end function is_same_pair
 
   !> Put two bodies into one group: a root is the lowest of its bodies.

@@ -6,7 +6,8 @@ module gravier_contact_packing
   use gravier_law_set, only: law_set_t
   use gravier_contact_kernels, only: kernels_t, lanes, n_blocks, block_of, lane_of, rolling_radius, contact_tangents
   use gravier_sweep_order, only: group_contacts
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
+  use gravier_moving_cell, only: cell_contacts_t
   use gravier_cell_response, only: image_velocity
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, add_travel
@@ -64,8 +65,6 @@ contains
     if (found%n > 0) sub%hot(:, :, n_blocks(found%n)) = 0.0_dp
     if (physics%laws%attracts) allocate (sub%attraction(lanes, n_blocks(found%n)), source=0.0_dp)
     if (physics%laws%yields) allocate (sub%spring(found%n))
-    if (physics%cell%moves) allocate (sub%cell%branch(kernels%nd, found%n), sub%cell%way(kernels%nd, found%n), &
-      & sub%cell%shift(kernels%nd, found%n))
     needs_start = physics%laws%returns .or. physics%laws%yields
     if (needs_start) then
       call find_start_velocities(view, boundaries, numbers, kernels, sub, start)
@@ -82,13 +81,13 @@ contains
       if (this%b > 0) then
         if (boundaries(this%b)%drive%turns()) call add_column(view, found, boundaries(this%b), physics, this, sub, start)
       end if
-      if (physics%cell%moves) call pack_image(view, this, sub)
+      if (physics%cell%moves) call pack_image(view, this, sub%cell)
       call pack_terms(view, found, kernels, physics%h, this, sub)
     end do
     if (needs_start) call pack_returned(view, found, boundaries, kernels, physics, start, sub)
     if (physics%laws%breaks) call pack_bonds(view, found, boundaries, kernels, physics, sub)
     do c = 1, merge(found%n, 0, physics%cell%moves)
-      call keep_shifts(kernels, c, sub)
+      call keep_shifts(kernels, sub%hot, c, sub%cell)
     end do
   end subroutine pack_contacts
 
@@ -105,8 +104,7 @@ contains
     this%g = block_of(c)
     this%f = found%order(c)
     this%p = found%source(this%f)
-    this%i = view%list%candidate(this%p)
-    this%j = view%list%antagonist(this%p)
+    call view%find_ends(this%p, this%i, this%j)
     this%b = found%boundary(this%f)
   end subroutine find_packed
 
@@ -133,28 +131,30 @@ contains
   end subroutine take_terms
 
   !> Branch of a contact and way to the image that it meets, in a cell that moves.
-  pure subroutine pack_image(view, this, sub)
+  pure subroutine pack_image(view, this, cell)
     type(local_bodies_t), intent(in) :: view
     type(packed_t), intent(in) :: this
-    type(subproblem_t), intent(inout) :: sub
+    type(cell_contacts_t), intent(inout) :: cell
 
-    associate (way => sub%cell%way(:, this%c))
+    associate (way => cell%way(:, this%c))
       way(:) = 0.0_dp
       call view%period%add_shift(view%list%shift(this%p), 1, way)
-      sub%cell%branch(:, this%c) = view%bodies%position(:, this%i) - view%bodies%position(:, this%j) - way
+      cell%branch(:, this%c) = view%bodies%position(:, this%i) - view%bodies%position(:, this%j) - way
     end associate
   end subroutine pack_image
 
   !> Keep what the law alone adds to the velocities of a contact.
-  pure subroutine keep_shifts(kernels, c, sub)
+  pure subroutine keep_shifts(kernels, hot, c, cell)
     type(kernels_t), intent(in) :: kernels
+    !> the contact data
+    real(dp), intent(in), contiguous :: hot(:, :, :)
     integer, intent(in) :: c
-    type(subproblem_t), intent(inout) :: sub
+    type(cell_contacts_t), intent(inout) :: cell
 
-    associate (row => kernels%row, shift => sub%cell%shift(:, c), q => lane_of(c), g => block_of(c))
+    associate (row => kernels%row, shift => cell%shift(:, c), q => lane_of(c), g => block_of(c))
       shift(:) = 0.0_dp
-      shift(1) = sub%hot(q, row%shift, g)
-      if (row%shift_t > 0) shift(2:) = sub%hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g)
+      shift(1) = hot(q, row%shift, g)
+      if (row%shift_t > 0) shift(2:) = hot(q, row%shift_t:row%shift_t + kernels%nd - 2, g)
     end associate
   end subroutine keep_shifts
 
@@ -172,8 +172,7 @@ contains
 
     do f = 1, found%n
       p = found%source(f)
-      i = view%list%candidate(p)
-      j = view%list%antagonist(p)
+      call view%find_ends(p, i, j)
       b = found%boundary(f)
       if (b > 0) then
         column = merge(sub%n_bodies + 1, numbers%of_boundary(b), boundaries(b)%drive%turns())
@@ -334,10 +333,10 @@ contains
 
     nd = kernels%nd
     allocate (v, mold=sub%impulse)
-    call kernels%contact_velocity(sub%pair, sub%hot, start, v)
+    call sub%contact_velocity(kernels, start, v)
     if (physics%laws%returns) then
       allocate (free, mold=v)
-      call kernels%contact_velocity(sub%pair, sub%hot, sub%v_free, free)
+      call sub%contact_velocity(kernels, sub%v_free, free)
     end if
     before = -1
     do c = 1, found%n

@@ -2,7 +2,7 @@
 module gravier_contact_places
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_halo, only: local_bodies_t
   implicit none
   private
@@ -22,9 +22,8 @@ contains
     real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd)
     integer :: i, j
 
-    i = view%list%candidate(sub%source(c))
-    j = view%list%antagonist(sub%source(c))
-    if (kernels%row%arm_i > 0) then
+    call view%find_ends(sub%source(c), i, j)
+    if (kernels%has_shapes()) then
       call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
       place(:) = view%bodies%position(:, i) + arm_i
       if (view%bodies%glued(i) > 0 .and. j > 0) place(:) = view%bodies%position(:, max(j, 1)) + arm_j

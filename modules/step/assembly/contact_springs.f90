@@ -7,10 +7,11 @@ module gravier_contact_springs
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of, contact_tangents, lanes
   use gravier_contact_operator, only: find_local_operator
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: subtract_images
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
   implicit none
   private
@@ -73,7 +74,7 @@ contains
         sub%hot(q, row%compliance_t, g) = law(1)
         sub%hot(q, row%shift_t + d - 2, g) = law(2)
         ! a cell that moves adds its own shift to that of the law
-        if (allocated(sub%cell%shift)) sub%cell%shift(d, c) = law(2)
+        call sub%cell%keep_shift(d, c, law(2))
       end do
     end associate
   end subroutine stretch_spring
@@ -163,23 +164,23 @@ contains
   !> velocity and its force: an elongation that fitted the force would move away from the bodies step by step. One that slides has
   !> the elongation that its force has, and one that carries nothing forgets. In space an elongation turns with the bodies about the
   !> normal, half of the way before they stretch it and half after: so it does no work.
-  subroutine conclude_springs(problem, h, halo)
+  subroutine conclude_springs(problem, h, views)
     type(contact_problem_t), intent(in) :: problem
     !> [s]
     real(dp), intent(in) :: h
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     real(dp), allocatable :: v(:, :, :)
     real(dp) :: elongation(2), t(3), s(3)
     logical :: slides
     integer :: k, c, d, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     do k = 1, size(problem%sub)
-      associate (sub => problem%sub(k), list => halo%view(k)%list)
+      associate (sub => problem%sub(k), list => views(k)%list)
         allocate (v, mold=sub%impulse)
         call list%forget_elongations()
-        call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
-        if (problem%cell%moves) call subtract_images(problem, k, v)
+        call sub%contact_velocity(problem%kernels, sub%v_global, v)
+        if (problem%cell_moves()) call subtract_images(problem, k, v)
         do c = 1, sub%n_contacts
           associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
             if (.not. (sub%yields(c) .and. sub%impulse(q, 1, g) > 0.0_dp)) cycle
@@ -238,22 +239,22 @@ contains
 
   !> Energies of the springs of a subdomain at the start and at the end of a solved step, along the normal and along the tangents,
   !> once `conclude_springs` was called. The spring of a contact that slides has the elongation that its force has all the time.
-  subroutine spring_energies(problem, k, halo, physics, energies)
+  subroutine spring_energies(problem, k, views, physics, energies)
     type(contact_problem_t), intent(in) :: problem
     !> place of the subdomain among those of this rank
     integer, intent(in) :: k
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     type(physics_t), intent(in) :: physics
     !> (along the normals and along the tangents; at the start and at the end) [J]
     real(dp), intent(out) :: energies(2, 2)
-    real(dp) :: v(lanes, problem%kernels%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
+    real(dp) :: v(lanes, problem%nc, size(problem%sub(k)%hot, 3)), elongation(2), before, after
     logical :: slides
     integer :: c, d
 
     energies(:, :) = 0.0_dp
-    associate (sub => problem%sub(k), nd => problem%kernels%nd, h => physics%h, theta => physics%theta)
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
-      if (problem%cell%moves) call subtract_images(problem, k, v)
+    associate (sub => problem%sub(k), nd => problem%nd, h => physics%h, theta => physics%theta)
+      call sub%contact_velocity(problem%kernels, sub%v_global, v)
+      if (problem%cell_moves()) call subtract_images(problem, k, v)
       do c = 1, sub%n_contacts
         if (.not. sub%yields(c)) cycle
         associate (q => lane_of(c), g => block_of(c), own => sub%spring(c))
@@ -266,7 +267,7 @@ contains
           if (before > 0.0_dp) energies(2, 1) = energies(2, 1) + own%spring%energy(0.0_dp, elongation)
           if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
           slides = uses_its_friction(sub, problem%kernels, c)
-          elongation(:) = kept_elongation(halo%view(k)%list, sub, c, nd)
+          elongation(:) = kept_elongation(views(k)%list, sub, c, nd)
           if (nd == 3) call turn_with_bodies(sub, problem%kernels, c, -0.5_dp*h, elongation)
           do d = 2, nd
             if (slides) then

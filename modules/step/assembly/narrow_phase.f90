@@ -85,7 +85,7 @@ contains
     type(screens_t) :: screens
 
     nd = decomposition%nd
-    alert = decomposition%rule%alert_distance
+    alert = decomposition%alert_distance()
     call joints%find(decomposition%boundaries)
     call screens%find(decomposition%boundaries)
     call work%init(nd, physics%h, counts=.false.)
@@ -141,16 +141,16 @@ contains
     type(shape_work_t), intent(inout) :: work
     type(contact_list_t), intent(inout) :: found
     type(pair_points_t) :: points
-    integer :: k
+    integer :: i, j, k
 
+    call view%find_ends(p, i, j)
     call find_points(view, decomposition, p, work, points)
     call carry_memory(points, p, view%list)
     do k = 1, points%n
       call write_point(points, k, p, found)
       if (joints%exist .and. .not. remembers(view%list, p + k - 1)) then
         associate (c => found%n + 1)
-          if (has_other(decomposition, joints, view%bodies, view%list%candidate(p), -view%list%antagonist(p), found%gap(c), &
-            & found%normal(:, c))) cycle
+          if (has_other(decomposition, joints, view%bodies, i, -j, found%gap(c), found%normal(:, c))) cycle
         end associate
       end if
       call add_contact(view, decomposition, physics, found)
@@ -202,19 +202,21 @@ contains
     !> part of the smaller radius that the bodies are thick there
     real(dp), parameter :: depth = 0.05_dp
     real(dp) :: branch(decomposition%nd), place(decomposition%nd)
+    integer :: i, j
 
     screened = .false.
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p), nd => decomposition%nd)
-      if (j < 0) return
+    call view%find_ends(p, i, j)
+    if (j < 0) return
+    associate (nd => decomposition%nd)
       branch(:) = (max(points%gap(k), 0.0_dp) + 2.0_dp*depth*min(view%bodies%radius(i), view%bodies%radius(j)))* &
         & points%normal(1:nd, k)
       place(:) = view%bodies%position(:, i) + points%point(1:nd, k) + 0.5_dp*branch
-      screened = screens%part(decomposition, view, p, place, branch)
-      if (.not. screened) return
-      branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
-      if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
-      screened = screens%part(decomposition, view, p, view%bodies%position(:, i), branch)
     end associate
+    screened = screens%part(decomposition, view, p, place, branch)
+    if (.not. screened) return
+    branch(:) = view%bodies%position(:, i) - view%bodies%position(:, j)
+    if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), -1, branch)
+    screened = screens%part(decomposition, view, p, view%bodies%position(:, i), branch)
   end function is_screened
 
   !> Write point `k` of pair `p` behind the last contact of the list.
@@ -236,15 +238,15 @@ contains
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: nd, p, k
     type(pair_points_t), intent(in) :: points
+    integer :: i, j
 
     place%arm_i(:) = points%point(:, k)
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      if (j > 0) then
-        place%arm_j(:) = points%point(:, k) - points%way
-      else
-        place%on_wall(1:nd) = view%bodies%position(:, i) + points%point(1:nd, k)
-      end if
-    end associate
+    call view%find_ends(p, i, j)
+    if (j > 0) then
+      place%arm_j(:) = points%point(:, k) - points%way
+    else
+      place%on_wall(1:nd) = view%bodies%position(:, i) + points%point(1:nd, k)
+    end if
   end function place_of_point
 
   !> Whether a pair is no contact: beyond the alert distance, and with nothing to remember.
@@ -263,8 +265,7 @@ contains
     type(neighbour_list_t), intent(in) :: list
     integer, intent(in) :: p
 
-    remembers = .false.
-    if (list%memory%law_row > 0) remembers = list%state(list%memory%law_row, p) /= 0
+    remembers = list%law_state(p) /= 0
   end function remembers
 
   !> Add the contact that was written behind the last one of the list, within the alert distance or with something to remember,
@@ -298,29 +299,28 @@ contains
     type(contact_list_t), intent(inout) :: found
     type(contact_pair_t) :: pair
     real(dp) :: gap
-    integer :: c, p, l, row
+    integer :: c, p, l
 
     c = found%n + 1
     p = found%source(c)
     gap = found%gap(c)
     l = law_of(view, decomposition%boundaries, physics%laws, p)
     if (physics%laws%varies_at(l)) then
-      row = view%list%memory%law_row
       pair%first = physics%first
       pair%h = physics%h
       pair%gap = gap
-      if (row > 0) pair%state = view%list%state(row, p)
+      pair%state = view%list%law_state(p)
       if (physics%laws%of(l)%law%sees_velocity) call find_pair_velocity(view, decomposition%boundaries, p, &
         & place_of(view, found, c, joined=.false.), found%normal(:, c), pair)
       call evaluate_pair(view, physics%laws%of(l)%law, p, pair)
-      if (row > 0) view%list%state(row, p) = pair%state
+      call view%list%set_law_state(p, pair%state)
     else
       pair%terms = terms_of(physics%laws, l, gap)
     end if
-    if (is_far(view%list, p, gap, decomposition%rule%alert_distance)) return
+    if (is_far(view%list, p, gap, decomposition%alert_distance())) return
     if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
     call keep_contact(view, found)
-    if (is_stretched(physics%laws%of(l)%law, pair, decomposition%rule%alert_distance)) &
+    if (is_stretched(physics%laws%of(l)%law, pair, decomposition%alert_distance())) &
       & found%stretched_bonds = found%stretched_bonds + 1
     found%terms(c) = pair%terms
     if (size(found%spring) > 0) found%spring(c) = pair%spring

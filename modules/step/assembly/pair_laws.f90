@@ -9,7 +9,7 @@ module gravier_pair_laws
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_contact_problem, only: contact_problem_t
   use gravier_cell_response, only: subtract_images
-  use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, find_start_velocity, find_surface_velocity, add_image_velocity
   implicit none
   private
@@ -35,11 +35,13 @@ contains
   pure integer function boundary_of(view, p) result(b)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
+    integer :: i, j
 
-    if (view%list%antagonist(p) < 0) then
-      b = -view%list%antagonist(p)
+    call view%find_ends(p, i, j)
+    if (j < 0) then
+      b = -j
     else
-      b = max(view%bodies%glued(view%list%candidate(p)), view%bodies%glued(view%list%antagonist(p)))
+      b = max(view%bodies%glued(i), view%bodies%glued(j))
     end if
   end function boundary_of
 
@@ -50,10 +52,13 @@ contains
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
     integer, intent(in) :: p
+    integer :: i, j
 
     l = 0
-    if (laws%n > 0) l = laws%number_of(material_of(view%bodies, boundaries, view%list%candidate(p)), &
-      & material_of(view%bodies, boundaries, view%list%antagonist(p)))
+    if (laws%n > 0) then
+      call view%find_ends(p, i, j)
+      l = laws%number_of(material_of(view%bodies, boundaries, i), material_of(view%bodies, boundaries, j))
+    end if
     if (l == 0) l = laws%default_of(boundary_of(view, p))
   end function law_of
 
@@ -83,8 +88,7 @@ contains
     integer :: i, j, nd
 
     nd = size(normal)
-    i = view%list%candidate(p)
-    j = view%list%antagonist(p)
+    call view%find_ends(p, i, j)
     call find_surface_velocity(view, boundaries, i, place%arm_i(1:nd), v)
     if (j > 0) then
       call find_surface_velocity(view, boundaries, j, place%arm_j(1:nd), w)
@@ -104,12 +108,12 @@ contains
     integer, intent(in) :: p
     !> with its gap, its state and whether the step is the first; and its velocity, if the law sees it
     type(contact_pair_t), intent(inout) :: pair
+    integer :: i, j
 
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      pair%radius = view%bodies%radius(i)
-      if (j > 0) pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
-      if (law%yields) call find_reduced(view, i, j, size(view%bodies%position, 1), pair)
-    end associate
+    call view%find_ends(p, i, j)
+    pair%radius = view%bodies%radius(i)
+    if (j > 0) pair%radius = sqrt(view%bodies%radius(i)*view%bodies%radius(j))
+    if (law%yields) call find_reduced(view, i, j, size(view%bodies%position, 1), pair)
     pair%terms%free_gap = max(pair%gap, 0.0_dp)
     pair%terms%rolling_friction = law%largest%rolling_friction
     pair%terms%pivoting_friction = law%largest%pivoting_friction
@@ -137,7 +141,7 @@ contains
   end subroutine find_reduced
 
   !> The states of the pairs of a solved problem, whose impulses and velocities are those of the solve.
-  subroutine conclude_pairs(problem, boundaries, laws, uncertain, in_motion, halo, doubtful)
+  subroutine conclude_pairs(problem, boundaries, laws, uncertain, in_motion, views, doubtful)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
@@ -145,7 +149,7 @@ contains
     real(dp), intent(in) :: uncertain
     !> bodies move by more than errors of the solve are compared with
     logical, intent(in) :: in_motion
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     !> some bond is at its limit, and the solve is not exact enough to tell whether it breaks
     logical, intent(out) :: doubtful
     real(dp), allocatable :: v(:, :, :)
@@ -156,14 +160,14 @@ contains
     pair%uncertain = uncertain
     pair%in_motion = in_motion
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+      associate (sub => problem%sub(s), view => views(s), nf => problem%nf)
         if (laws%breaks) call find_slips(problem, s, v)
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)
           q = lane_of(c)
           g = block_of(c)
-          pair%state = view%list%state(view%list%memory%law_row, p)
+          pair%state = view%list%law_state(p)
           pair%gap = sub%gap(c)
           pair%normal = sub%impulse(q, 1, g)
           pair%tangential = norm2(sub%impulse(q, 2:nf, g))
@@ -172,7 +176,7 @@ contains
             pair%motion = hypot(max(pair%parting, 0.0_dp), norm2(v(q, 2:nf, g)))
           end if
           call laws%of(l)%law%conclude(pair)
-          view%list%state(view%list%memory%law_row, p) = pair%state
+          call view%list%set_law_state(p, pair%state)
           doubtful = doubtful .or. pair%doubtful
         end do
       end associate
@@ -181,11 +185,11 @@ contains
   end subroutine conclude_pairs
 
   !> Whether an intact bond is at its limit in a solved problem. Collective.
-  logical function bonds_at_limit(problem, boundaries, laws, halo) result(are_at_limit)
+  logical function bonds_at_limit(problem, boundaries, laws, views) result(are_at_limit)
     type(contact_problem_t), intent(in) :: problem
     type(boundary_t), intent(in) :: boundaries(:)
     type(law_set_t), intent(in) :: laws
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     type(contact_pair_t) :: pair
     integer :: s, c, q, g, l, p
 
@@ -193,14 +197,14 @@ contains
     ! whatever moves is in doubt
     pair%uncertain = huge(1.0_dp)
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s), nf => problem%kernels%nf)
+      associate (sub => problem%sub(s), view => views(s), nf => problem%nf)
         do c = 1, sub%n_contacts
           p = sub%source(c)
           l = law_of(view, boundaries, laws, p)
           if (.not. laws%of(l)%law%breaks) cycle
           q = lane_of(c)
           g = block_of(c)
-          pair%state = view%list%state(view%list%memory%law_row, p)
+          pair%state = view%list%law_state(p)
           pair%normal = sub%impulse(q, 1, g)
           pair%tangential = norm2(sub%impulse(q, 2:nf, g))
           call laws%of(l)%law%conclude(pair)
@@ -220,13 +224,13 @@ contains
     real(dp), allocatable, intent(out) :: v(:, :, :)
     integer :: last
 
-    associate (sub => problem%sub(s), row => problem%kernels%row)
+    associate (sub => problem%sub(s), row => problem%row)
       allocate (v, mold=sub%impulse)
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, v)
-      if (problem%cell%moves) call subtract_images(problem, s, v)
+      call sub%contact_velocity(problem%kernels, sub%v_global, v)
+      if (problem%cell_moves()) call subtract_images(problem, s, v)
       v(:, 1, :) = v(:, 1, :) + sub%hot(:, row%shift, :)
       if (row%shift_t == 0) return
-      last = problem%kernels%nf - 2
+      last = problem%nf - 2
       v(:, 2:2 + last, :) = v(:, 2:2 + last, :) + sub%hot(:, row%shift_t:row%shift_t + last, :)
     end associate
   end subroutine find_slips

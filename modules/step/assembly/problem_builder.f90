@@ -6,7 +6,8 @@ module gravier_problem_builder
   use gravier_boundary, only: boundary_t
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t, halo_t
   use gravier_physics, only: physics_t
@@ -34,7 +35,7 @@ contains
     integer :: s, b
 
     problem%comm => decomposition%comm
-    problem%kernels = kernels
+    call problem%take_kernels(kernels)
     problem%n_subdomains = decomposition%n_subdomains
     problem%cell = physics%cell
     if (allocated(problem%sub)) deallocate (problem%sub)
@@ -52,7 +53,7 @@ contains
     end do
     call start_timer(phase_interface)
     call find_interface(decomposition, problem)
-    call count_figures(decomposition, halo, problem, figures)
+    call count_figures(decomposition, halo%view, problem, figures)
     problem%attracts = physics%laws%attracts
     problem%carries = .false.
     do b = 1, merge(size(decomposition%boundaries), 0, physics%laws%breaks)
@@ -78,7 +79,7 @@ contains
     integer :: c, p, b, n, n_asleep
 
     associate (list => view%list, boundaries => decomposition%boundaries)
-      allocate (numbers%of_grain(view%bodies%n), numbers%of_boundary(size(boundaries)), source=0)
+      allocate (numbers%of_grain(view%n_bodies()), numbers%of_boundary(size(boundaries)), source=0)
       n = 0
       n_asleep = 0
       sub%n_grains = 0
@@ -114,7 +115,10 @@ contains
       if (any(abs(physics%body_force) > 0.0_dp)) allocate (sub%volume(sub%n_grains))
       if (decomposition%na > 0) allocate (sub%applied(decomposition%na, sub%n_grains))
       call pack_grains(view, numbers%of_grain, decomposition%figures, kernels, physics, sub)
-      if (physics%cell%moves) call pack_places(view, numbers%of_grain, sub)
+      if (physics%cell%moves) then
+        call sub%cell%init(kernels%nd, found%n, sub%n_grains)
+        call pack_places(view, numbers%of_grain, sub%cell%place)
+      end if
       do b = 1, size(boundaries)
         if (numbers%of_boundary(b) == 0 .or. boundaries(b)%drive%turns()) cycle
         call pack_boundary(boundaries(b), b, numbers%of_boundary(b), decomposition%n_subdomains, kernels, sub)
@@ -183,17 +187,17 @@ contains
   end subroutine pack_grains
 
   !> Places of the grains in a cell that moves.
-  pure subroutine pack_places(view, number_of, sub)
+  pure subroutine pack_places(view, number_of, place)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in), contiguous :: number_of(:)
-    type(subproblem_t), intent(inout) :: sub
+    !> (nd, grains) [m]
+    real(dp), intent(inout), contiguous :: place(:, :)
     real(dp) :: centre(3)
     integer :: k
 
-    allocate (sub%cell%place(size(view%bodies%position, 1), sub%n_grains))
     centre(:) = view%period%centre()
     do k = 1, size(number_of)
-      if (number_of(k) > 0) sub%cell%place(:, number_of(k)) = view%bodies%position(:, k) - centre(1:size(sub%cell%place, 1))
+      if (number_of(k) > 0) place(:, number_of(k)) = view%bodies%position(:, k) - centre(1:size(place, 1))
     end do
   end subroutine pack_places
 
@@ -225,17 +229,17 @@ contains
   !> that it gives where nothing moves. Collective.
   subroutine find_scales(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: scales(3), moving(problem%kernels%nd), rim, speed, lightest, inverse
+    real(dp) :: scales(3), moving(problem%nd), rim, speed, lightest, inverse
     integer :: s, b, c, d, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     scales(:) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         lightest = huge(1.0_dp)
         do b = 1, sub%n_bodies
           rim = 0.0_dp
-          if (problem%kernels%row%arm_i > 0 .and. b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
+          if (problem%has_shapes() .and. b <= sub%n_grains) rim = sub%radius(b)*norm2(sub%v_free(nd + 1:, b))
           scales(2) = max(scales(2), norm2(sub%v_free(1:nd, b)) + rim)
           moving(:) = sub%v_free(1:nd, b)
           do d = 1, nd
@@ -253,11 +257,11 @@ contains
         end do
         do c = 1, merge(sub%n_contacts, 0, allocated(sub%spring))
           if (.not. sub%yields(c)) cycle
-          associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%kernels%row)
+          associate (contact => sub%hot(lane_of(c), :, block_of(c)), row => problem%row)
             scales(1) = max(scales(1), -contact(row%shift)/contact(row%compliance_n))
           end associate
         end do
-        do c = 1, merge(sub%n_contacts, 0, problem%cell%moves)
+        do c = 1, merge(sub%n_contacts, 0, problem%cell_moves())
           moving(:) = problem%cell%added(problem%cell%free, sub%cell%branch(:, c), sub%cell%way(:, c))
           speed = norm2(moving)
           scales(1) = max(scales(1), speed/lightest)

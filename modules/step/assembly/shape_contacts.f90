@@ -88,13 +88,11 @@ contains
 
     points%n = 0
     points%way(:) = 0.0_dp
-    work%alert = decomposition%rule%alert_distance
-    i = view%list%candidate(p)
-    j = view%list%antagonist(p)
+    work%alert = decomposition%alert_distance()
+    call view%find_ends(p, i, j)
     associate (bodies => view%bodies)
       if (j > 0) then
-        way(:) = bodies%position(:, j) - bodies%position(:, i)
-        if (size(view%list%shift) > 0) call decomposition%period%add_shift(view%list%shift(p), 1, way)
+        call view%find_way(p, decomposition%period, way)
         if (norm2(way) > bodies%radius(i) + bodies%radius(j) + work%alert) return
         call see_body(bodies, i, candidate)
         call see_body(bodies, j, antagonist)
@@ -126,11 +124,11 @@ contains
     integer :: k, number(2)
 
     number(:) = 1
-    several = n_pieces(shapes, a)*n_pieces(shapes, b) > 1 .and. a%shape > 0
+    several = shapes%n_pieces(a%shape)*shapes%n_pieces(b%shape) > 1 .and. a%shape > 0
     if (a%shape == 0) then
       call touch(work%ball)
     else
-      do k = 1, size(shapes%shape(a%shape)%piece)
+      do k = 1, shapes%n_pieces(a%shape)
         number(1) = k
         call touch(shapes%shape(a%shape)%piece(k))
       end do
@@ -145,7 +143,7 @@ contains
       if (b%shape == 0) then
         call touch_piece(piece, work%ball, a, b, number, work, points)
       else
-        do l = 1, size(shapes%shape(b%shape)%piece)
+        do l = 1, shapes%n_pieces(b%shape)
           number(2) = l
           associate (other => shapes%shape(b%shape)%piece(l))
             ! bodies of one piece each are near to each other by their own balls
@@ -219,7 +217,7 @@ contains
     integer :: k
 
     call decomposition%boundaries(j)%find_facets(centre, a%radius + work%alert, work%near)
-    do k = 1, n_pieces(decomposition%shapes, a)
+    do k = 1, decomposition%shapes%n_pieces(a%shape)
       if (work%near%n == 0) exit
       if (a%shape == 0) then
         call touch(work%ball)
@@ -279,7 +277,7 @@ contains
       call boundary%find_corners(centre, n, corners)
       if (n > 0) call sheet%init(boundary, j, centre, corners(:, 1:n))
     end associate
-    do k = 1, n_pieces(decomposition%shapes, a)
+    do k = 1, decomposition%shapes%n_pieces(a%shape)
       if (a%shape == 0) then
         call touch(work%ball)
       else
@@ -473,13 +471,5 @@ contains
       end do
     end associate
   end function seam_of
-
-  pure integer function n_pieces(shapes, seen) result(n)
-    type(shape_library_t), intent(in) :: shapes
-    type(seen_body_t), intent(in) :: seen
-
-    n = 1
-    if (seen%shape > 0) n = size(shapes%shape(seen%shape)%piece)
-  end function n_pieces
 
 end module gravier_shape_contacts

@@ -37,18 +37,17 @@ contains
     real(dp), intent(in) :: normal(:)
     logical, intent(in) :: joined
     real(dp) :: reach
-    integer :: nd
+    integer :: i, j, nd
 
     nd = size(normal)
-    associate (i => view%list%candidate(p), j => view%list%antagonist(p))
-      reach = merge(merge(0.5_dp, 1.0_dp, j > 0)*gap, 0.0_dp, joined)
-      place%arm_i(1:nd) = -(view%bodies%radius(i) + reach)*normal
-      if (j > 0) then
-        place%arm_j(1:nd) = (view%bodies%radius(j) + reach)*normal
-      else
-        call find_wall_point(view, i, gap, normal, place%on_wall(1:nd))
-      end if
-    end associate
+    call view%find_ends(p, i, j)
+    reach = merge(merge(0.5_dp, 1.0_dp, j > 0)*gap, 0.0_dp, joined)
+    place%arm_i(1:nd) = -(view%bodies%radius(i) + reach)*normal
+    if (j > 0) then
+      place%arm_j(1:nd) = (view%bodies%radius(j) + reach)*normal
+    else
+      call find_wall_point(view, i, gap, normal, place%on_wall(1:nd))
+    end if
   end function round_place
 
   !> Velocity of body `k`: of a free grain, translation and spin; of a boundary, the velocity of its material at a point, as a

@@ -114,7 +114,7 @@ contains
 
     p(:) = 0.0_dp
     place(:) = 0.0_dp
-    associate (sub => problem%sub(s), nd => problem%kernels%nd, row => problem%kernels%row, q => lane_of(c), g => block_of(c))
+    associate (sub => problem%sub(s), nd => problem%nd, row => problem%row, q => lane_of(c), g => block_of(c))
       call problem%impulse_on_candidate(s, c, p(1:nd))
       call find_contact_place(problem%kernels, view, sub, c, place(1:nd))
       ! disks and spheres touch a boundary on its surface; all other contacts are half-way between the surfaces

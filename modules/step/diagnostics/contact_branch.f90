@@ -2,7 +2,7 @@
 module gravier_contact_branch
   use gravier_kinds, only: dp
   use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   implicit none
   private
   public :: find_branch
@@ -20,7 +20,7 @@ contains
     real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd), length
     integer :: k
 
-    if (kernels%row%arm_i > 0) then
+    if (kernels%has_shapes()) then
       call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
       branch(:) = arm_j - arm_i
       if (maxval(sub%pair(:, c)) > sub%n_grains) &

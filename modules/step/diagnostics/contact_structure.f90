@@ -3,9 +3,10 @@ module gravier_contact_structure
   use gravier_kinds, only: dp, i4, i8
   use gravier_contact_law, only: unused
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t, halo_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   use gravier_diagnostic, only: diagnostic_t, diagnostic_features_t, solved_step_t, column_list_t, histogram_t
@@ -102,22 +103,22 @@ contains
   subroutine structure_measure(self, step)
     class(contact_structure_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step
-    call measure_structure(self, step%problem, step%halo, step%n_free, step%physics%h)
+    call measure_structure(self, step%problem, step%halo%view, step%n_free, step%physics%h)
   end subroutine structure_measure
 
-  subroutine measure_structure(self, problem, halo, n_free, h)
+  subroutine measure_structure(self, problem, views, n_free, h)
     type(contact_structure_t), intent(inout) :: self
     type(contact_problem_t), intent(inout) :: problem
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     !> free grains of the scene
     integer(i8), intent(in) :: n_free
     !> [s]
     real(dp), intent(in) :: h
-    real(dp) :: parts(problem%kernels%nd**2 + 2, size(problem%sub)), sums(problem%kernels%nd**2 + 2), largest
+    real(dp) :: parts(problem%nd**2 + 2, size(problem%sub)), sums(problem%nd**2 + 2), largest
     integer(i8) :: counts(n_counts)
     integer :: s, c, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     parts(:, :) = 0.0_dp
     counts(:) = 0
     largest = 0.0_dp
@@ -127,7 +128,7 @@ contains
         largest = max(largest, problem%sub(s)%normal_impulse(c))
       end do
     end do
-    call count_ends(problem, halo, counts)
+    call count_ends(problem, views, counts)
     call problem%comm%sum_counts(counts)
     call problem%comm%sum_parts(parts, sums)
     self%force_max = problem%comm%highest(largest)/h
@@ -154,7 +155,7 @@ contains
     integer(i8) :: counts(n_counts)
 
     counts(:) = 0
-    call count_ends(problem, halo, counts)
+    call count_ends(problem, halo%view, counts)
     call problem%comm%sum_counts(counts)
     carrying_neighbours = ratio(real(counts(ends), dp), n_free)
   end function carrying_neighbours
@@ -208,9 +209,9 @@ contains
 
   !> Count the neighbours of free grains that carry, and those of grains that two or more carrying contacts hold. A shared grain is
   !> counted in the first of its subdomains. Collective.
-  subroutine count_ends(problem, halo, counts)
+  subroutine count_ends(problem, views, counts)
     type(contact_problem_t), intent(inout) :: problem
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     integer(i8), intent(inout) :: counts(n_counts)
     logical, allocatable :: counted_elsewhere(:)
     !> an exchange takes columns of nv
@@ -218,8 +219,8 @@ contains
     integer :: s, b, k, n, neighbours
 
     do s = 1, size(problem%sub)
-      allocate (tally(s)%ends(problem%kernels%nv, problem%sub(s)%n_columns), source=0.0_dp)
-      call tally_contacts(problem%sub(s), halo%view(s)%list, tally(s))
+      allocate (tally(s)%ends(problem%nv, problem%sub(s)%n_columns), source=0.0_dp)
+      call tally_contacts(problem%sub(s), views(s)%list, tally(s))
       call problem%shared%load(s, tally(s)%ends)
     end do
     call problem%shared%pass()

@@ -5,8 +5,8 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
-  use gravier_contact_kernels, only: contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_kernels, only: kernels_t, contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: image_velocity
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
@@ -50,9 +50,8 @@ module gravier_energy_balance
     procedure :: set_state => energy_set_state
   end type energy_balance_t
 
-  !> words of the state of a balance
+  !> words of the state of a balance, and what they are, in their order: the version of checkpoints, which changes with them
   integer, parameter :: energy_words = 15
-  !> what they are, in their order: the version of checkpoints, which changes with them
   character(len=*), parameter :: energy_record = "translation rotation boundaries potential start load_work boundary_work "// &
     & "dissipated_normal dissipated_friction carried_away elastic elastic_start dissipated_rolling dissipated_pivoting"
   !> places among the sums of a step
@@ -170,17 +169,17 @@ contains
     do s = 1, size(step%problem%sub)
       call add_grains(step%halo%view(s), step%decomposition, s, step%physics, parts(:, s))
       call add_contacts(step, earlier, s, parts(:, s))
-      if (step%problem%cell%moves) parts(in_boundary, s) = parts(in_boundary, s) + work_of_carrying(step%halo%view(s), &
+      if (step%problem%cell_moves()) parts(in_boundary, s) = parts(in_boundary, s) + work_of_carrying(step%halo%view(s), &
         & step%decomposition, s, step%physics%cell)
       if (.not. self%has_springs) cycle
-      call spring_energies(step%problem, s, step%halo, step%physics, springs)
+      call spring_energies(step%problem, s, step%halo%view, step%physics, springs)
       parts(in_springs + 1:in_springs + 2, s) = springs(:, 1)
       parts(in_springs + 3:in_springs + 4, s) = springs(:, 2)
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
     if (step%others) then
       self%carried_away = self%carried_away + (self%translation + self%rotation - sums(in_start))
-    else if (step%problem%cell%moves) then
+    else if (step%problem%cell_moves()) then
       ! grains that cross the cell have the velocity of another image; in a step before which bodies were taken away or set, that
       ! is a part of what these have carried away
       self%boundary_work = self%boundary_work - (self%translation + self%rotation - sums(in_start))
@@ -223,7 +222,7 @@ contains
     integer :: k
 
     rotation = 0.0_dp
-    do k = 1, view%bodies%n
+    do k = 1, view%n_bodies()
       if (view%origin(k) == 0 .or. view%bodies%glued(k) > 0) cycle
       associate (before => view%bodies%velocity(:, k), after => decomposition%owned(s)%velocity(:, view%origin(k)), &
         & figures => decomposition%figures)
@@ -250,13 +249,13 @@ contains
 
     associate (sub => step%problem%sub(s), kernels => step%problem%kernels)
       allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
-      call find_start(step, earlier, s, mean)
+      call find_start(step, step%halo%view(s), sub, earlier, mean)
       mean(:, :) = 0.5_dp*(mean + sub%v_global)
-      call kernels%contact_velocity(sub%pair, sub%hot, mean, v)
+      call sub%contact_velocity(kernels, mean, v)
       do c = 1, sub%n_contacts
         q = lane_of(c)
         g = block_of(c)
-        if (step%problem%cell%moves) call add_cell_work(c)
+        if (step%problem%cell_moves()) call add_cell_work(c)
         part(in_normal) = part(in_normal) - sub%normal_impulse(c)*v(q, 1, g)
         part(in_friction) = part(in_friction) - sum(sub%impulse(q, 2:, g)*v(q, 2:, g))
         if (kernels%rolling_row > 0) then
@@ -274,13 +273,13 @@ contains
     !> The image that a contact meets moves with the cell, as a boundary does.
     subroutine add_cell_work(c)
       integer, intent(in) :: c
-      real(dp) :: image(step%problem%kernels%nd), mean_gradient(3, 3)
+      real(dp) :: image(step%problem%nd), mean_gradient(3, 3)
       integer :: nf
 
       associate (sub => step%problem%sub(s), cell => step%problem%cell)
-        nf = step%problem%kernels%nf
+        nf = step%problem%nf
         mean_gradient(:, :) = 0.5_dp*(cell%before + cell%now)
-        image(:) = image_velocity(sub, step%problem%kernels%nd, c, mean_gradient)
+        image(:) = image_velocity(sub, step%problem%nd, c, mean_gradient)
         v(q, 1:nf, g) = v(q, 1:nf, g) - image(1:nf)
         part(in_boundary) = part(in_boundary) + sub%normal_impulse(c)*image(1) + sum(sub%impulse(q, 2:nf, g)*image(2:nf))
       end associate
@@ -288,7 +287,7 @@ contains
 
     subroutine add_boundary_work(c)
       integer, intent(in) :: c
-      real(dp) :: p(step%problem%kernels%nd), m(step%problem%kernels%nv - step%problem%kernels%nd)
+      real(dp) :: p(step%problem%nd), m(step%problem%nv - step%problem%nd)
       integer :: column, d
 
       associate (problem => step%problem, sub => step%problem%sub(s))
@@ -301,10 +300,10 @@ contains
         do d = 1, size(p)
           if (.not. earlier(sub%boundary(column))%free(d)) part(in_boundary) = part(in_boundary) + p(d)*mean(d, column)
         end do
-        if (problem%kernels%rolling_row == 0) return
+        if (.not. problem%has_rolling()) return
         call global_moment(problem%kernels, sub%hot, sub%impulse, c, m)
         if (sub%pair(1, c) > sub%n_grains) m(:) = -m
-        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%kernels%nd + 1:, column))
+        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%nd + 1:, column))
       end associate
     end subroutine add_boundary_work
 
@@ -312,24 +311,22 @@ contains
 
   !> Velocities of the columns of a subproblem at the start of the step; spins as they are at its end without moments, which have
   !> the same energy.
-  subroutine find_start(step, earlier, s, start)
+  subroutine find_start(step, view, sub, earlier, start)
     type(solved_step_t), intent(in) :: step
+    type(local_bodies_t), intent(in) :: view
+    type(subproblem_t), intent(in) :: sub
     type(boundary_t), intent(in) :: earlier(:)
-    integer, intent(in) :: s
     !> (nv, n_columns)
     real(dp), intent(out), contiguous :: start(:, :)
     integer :: c, i, j, nd
 
-    nd = step%problem%kernels%nd
+    nd = step%problem%nd
     start(:, :) = 0.0_dp
-    associate (sub => step%problem%sub(s), list => step%halo%view(s)%list)
-      do c = 1, sub%n_contacts
-        i = list%candidate(sub%source(c))
-        j = list%antagonist(sub%source(c))
-        call fill(sub%pair(1, c), i)
-        call fill(sub%pair(2, c), j)
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      call view%find_ends(sub%source(c), i, j)
+      call fill(sub%pair(1, c), i)
+      call fill(sub%pair(2, c), j)
+    end do
 
   contains
 
@@ -338,40 +335,39 @@ contains
       integer, intent(in) :: column, k
       real(dp) :: point(nd), now(nd)
 
-      associate (bodies => step%halo%view(s)%bodies, sub => step%problem%sub(s))
-        if (column <= sub%n_grains) then
-          start(:, column) = bodies%velocity(1:size(start, 1), k)
-          call step%decomposition%figures%turn_freely(bodies, k, step%physics%h, start(:, column))
-          return
-        end if
-        call find_touched_point(step, s, c, k, point)
-        call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
-        ! what the end of the step has of the travel of the body (add_travel), its start lacks
-        if (earlier(sub%boundary(column))%drive%turns()) then
-          call step%decomposition%boundaries(sub%boundary(column))%velocity_at(point, now)
-          start(1:nd, column) = start(1:nd, column) - (sub%v_global(1:nd, column) - now)
-        end if
-        start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
-      end associate
+      if (column <= sub%n_grains) then
+        start(:, column) = view%bodies%velocity(1:size(start, 1), k)
+        call step%decomposition%figures%turn_freely(view%bodies, k, step%physics%h, start(:, column))
+        return
+      end if
+      call find_touched_point(step%problem%kernels, view, sub, c, k, point)
+      call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
+      ! what the end of the step has of the travel of the body (add_travel), its start lacks
+      if (earlier(sub%boundary(column))%drive%turns()) then
+        call step%decomposition%boundaries(sub%boundary(column))%velocity_at(point, now)
+        start(1:nd, column) = start(1:nd, column) - (sub%v_global(1:nd, column) - now)
+      end if
+      start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
     end subroutine fill
 
   end subroutine find_start
 
   !> Where a free grain touches boundary -k, or grain `k` that is part of one, at contact `c`.
-  pure subroutine find_touched_point(step, s, c, k, point)
-    type(solved_step_t), intent(in) :: step
-    integer, intent(in) :: s, c, k
+  pure subroutine find_touched_point(kernels, view, sub, c, k, point)
+    type(kernels_t), intent(in) :: kernels
+    type(local_bodies_t), intent(in) :: view
+    type(subproblem_t), intent(in) :: sub
+    integer, intent(in) :: c, k
     !> (nd) [m]
     real(dp), intent(out) :: point(:)
     real(dp), dimension(size(point)) :: normal, arm_i, arm_j
     integer :: i, j
 
-    associate (sub => step%problem%sub(s), bodies => step%halo%view(s)%bodies, list => step%halo%view(s)%list)
-      i = list%candidate(sub%source(c))
-      j = list%antagonist(sub%source(c))
+    call view%find_ends(sub%source(c), i, j)
+    associate (bodies => view%bodies)
       normal(:) = sub%hot(lane_of(c), 1:size(point), block_of(c))
-      if (step%problem%kernels%row%arm_i > 0) then
-        call contact_arms(step%problem%kernels, sub%hot, c, arm_i, arm_j)
+      if (kernels%has_shapes()) then
+        call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
         if (k == i) then
           point(:) = bodies%position(:, j) + arm_j
         else

@@ -7,7 +7,7 @@ module gravier_grain_balance
   use gravier_periodic, only: gradient_times
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
-  use gravier_contact_problem, only: subproblem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_moving_cell, only: cell_motion_t
   use gravier_halo, only: local_bodies_t
@@ -74,7 +74,7 @@ contains
     integer :: s, nd
 
     nd = step%decomposition%nd
-    if (step%others .or. step%problem%cell%moves) then
+    if (step%others .or. step%problem%cell_moves()) then
       kinetic = self%kinetic
       parts(:, :) = 0.0_dp
       do s = 1, size(parts, 2)
@@ -91,8 +91,8 @@ contains
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
       call add_grains(step%decomposition%figures, step%decomposition%owned(s), step%physics, parts(:, s))
-      call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%kernels%nv, parts(in_contacts, s))
-      if (step%problem%cell%moves) parts(in_contacts, s) = parts(in_contacts, s) + work_of_carrying(step%halo%view(s), &
+      call add_contact_work(step%problem%sub(s), step%physics, nd, step%problem%nv, parts(in_contacts, s))
+      if (step%problem%cell_moves()) parts(in_contacts, s) = parts(in_contacts, s) + work_of_carrying(step%halo%view(s), &
         & step%decomposition, s, step%physics%cell)
     end do
     call step%decomposition%comm%sum_parts(parts, sums)
@@ -236,7 +236,7 @@ contains
     centre(:) = decomposition%period%centre()
     change(:, :) = motion%now - motion%before
     work = 0.0_dp
-    do k = 1, view%bodies%n
+    do k = 1, view%n_bodies()
       if (view%origin(k) == 0) cycle
       associate (before => view%bodies%velocity(1:nd, k), after => decomposition%owned(s)%velocity(1:nd, view%origin(k)))
         place(:) = view%bodies%position(:, k) - centre(1:nd)

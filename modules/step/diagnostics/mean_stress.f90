@@ -102,10 +102,10 @@ contains
   subroutine sum_moments(problem, moments)
     type(contact_problem_t), intent(in) :: problem
     real(dp), allocatable, intent(out) :: moments(:)
-    real(dp) :: parts(problem%kernels%nd**2, size(problem%sub))
+    real(dp) :: parts(problem%nd**2, size(problem%sub))
     integer :: s
 
-    allocate (moments(problem%kernels%nd**2))
+    allocate (moments(problem%nd**2))
     parts(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
       call add_contacts(problem, s, parts(:, s))
@@ -119,10 +119,10 @@ contains
     integer, intent(in) :: s
     !> (nd**2) [N m s]
     real(dp), intent(inout) :: part(:)
-    real(dp) :: p(problem%kernels%nd), branch(problem%kernels%nd)
+    real(dp) :: p(problem%nd), branch(problem%nd)
     integer :: c, d, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     associate (sub => problem%sub(s))
       do c = 1, sub%n_contacts
         call problem%impulse_on_candidate(s, c, p)

@@ -362,7 +362,7 @@ contains
 
     nd = grid%nd
     associate (sub => problem%sub(s), view => halo%view(s))
-      do i = 1, view%bodies%n
+      do i = 1, view%n_bodies()
         if (view%origin(i) > 0 .and. view%bodies%glued(i) == 0) call add_one(holders, view%bodies%position(:, i))
       end do
       do c = 1, sub%n_contacts

@@ -200,7 +200,7 @@ contains
       part(:) = 0.0_dp
       part(1) = sub%product_of(change, change)
       do b = 1, sub%n_bodies
-        inverse = inverse_of_translation(sub%inverse_mass(:, b), problem%kernels%nd)
+        inverse = inverse_of_translation(sub%inverse_mass(:, b), problem%nd)
         if (.not. inverse > 0.0_dp) cycle
         if (b <= sub%n_grains) part(2) = part(2) + 1.0_dp/(inverse*sub%multiplicity(b))
         part(3) = part(3) + 1.0_dp/(inverse*sub%multiplicity(b))
@@ -221,7 +221,7 @@ contains
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call add_contacts(problem%kernels%nf, problem%sub(s)%n_contacts, kept(s)%value, problem%sub(s)%impulse, parts(:, s))
+      call add_contacts(problem%nf, problem%sub(s)%n_contacts, kept(s)%value, problem%sub(s)%impulse, parts(:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
     call self%contacts%add(sums(1), sums(2))

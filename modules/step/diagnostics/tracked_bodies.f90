@@ -80,10 +80,9 @@ contains
     n = size(self%wrench, 1)
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
-      associate (sub => step%problem%sub(s), list => step%halo%view(s)%list, id => step%halo%view(s)%bodies%id)
+      associate (sub => step%problem%sub(s), view => step%halo%view(s), id => step%halo%view(s)%bodies%id)
         do c = 1, sub%n_contacts
-          i = list%candidate(sub%source(c))
-          j = list%antagonist(sub%source(c))
+          call view%find_ends(sub%source(c), i, j)
           do b = 1, size(self%id)
             first = (b - 1)*n
             if (id(i) == self%id(b)) call add_contact(step%problem, s, c, 1, parts(first + 1:first + n, s))
@@ -107,14 +106,14 @@ contains
     integer, intent(in) :: s, c, side
     !> without friction contacts turn no body: its last entries are left [N s, N m s]
     real(dp), intent(inout) :: impulse(:)
-    real(dp) :: jacobian(problem%kernels%nc, problem%kernels%nv, 2), r(problem%kernels%nc)
+    real(dp) :: jacobian(problem%nc, problem%nv, 2), r(problem%nc)
     integer :: d
 
     associate (sub => problem%sub(s))
       call contact_jacobian(problem%kernels, sub%hot, c, jacobian(:, :, 1), jacobian(:, :, 2))
       r(:) = sub%impulse(lane_of(c), :, block_of(c))
       r(1) = sub%normal_impulse(c)
-      do d = 1, min(problem%kernels%nv, size(impulse))
+      do d = 1, min(problem%nv, size(impulse))
         impulse(d) = impulse(d) + sum(jacobian(:, d, side)*r)
       end do
     end associate

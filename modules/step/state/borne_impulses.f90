@@ -7,10 +7,11 @@ module gravier_borne_impulses
   use gravier_kinds, only: dp, i8
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: contacts_t, impulses_t, find_seen, find_borne, leave_out, take_back
@@ -49,9 +50,9 @@ contains
   end subroutine find_seen
 
   !> Sums over some contacts of their impulses on the grains that sleep in the problem, or on all grains. Collective.
-  subroutine find_borne(decomposition, halo, problem, some, all_grains, borne)
+  subroutine find_borne(decomposition, views, problem, some, all_grains, borne)
     type(decomposition_t), intent(in) :: decomposition
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     type(contact_problem_t), intent(in) :: problem
     !> contacts that count, of each subdomain of this rank
     type(contacts_t), intent(in) :: some(:)
@@ -67,7 +68,7 @@ contains
       n = 0
       do s = 1, size(problem%sub)
         if (.not. any(some(s)%are)) cycle
-        associate (sub => problem%sub(s), view => halo%view(s))
+        associate (sub => problem%sub(s), view => views(s))
           if (round == 1) call sum_impulses(problem, s, some(s)%are, part(s)%on)
           call find_seen(view%list, sub, seen)
           do b = merge(1, sub%n_grains + 1, all_grains), sub%n_columns
@@ -77,21 +78,21 @@ contains
             destination(n) = decomposition%comm%rank_of(view%owner(seen(b)), decomposition%n_subdomains)
             records(1, n) = view%owner(seen(b))
             records(2, n) = view%bodies%id(seen(b))
-            do d = 1, problem%kernels%nv
+            do d = 1, problem%nv
               records(2 + d, n) = transfer(part(s)%on(d, b), 0_i8)
             end do
           end do
         end associate
       end do
-      if (round == 1) allocate (records(2 + problem%kernels%nv, n), destination(n))
+      if (round == 1) allocate (records(2 + problem%nv, n), destination(n))
     end do
     call sparse_exchange(decomposition%comm, records, destination, received)
     do s = 1, size(borne)
-      allocate (borne(s)%on(problem%kernels%nv, decomposition%owned(s)%n), source=0.0_dp)
+      allocate (borne(s)%on(problem%nv, decomposition%owned(s)%n), source=0.0_dp)
     end do
     do k = 1, size(received, 2)
       call decomposition%find_owned(received(1:2, k), h, place)
-      do d = 1, problem%kernels%nv
+      do d = 1, problem%nv
         borne(h)%on(d, place) = borne(h)%on(d, place) + transfer(received(2 + d, k), 0.0_dp)
       end do
     end do
@@ -115,48 +116,48 @@ contains
         impulse(lane_of(c), :, block_of(c)) = sub%impulse(lane_of(c), :, block_of(c))
         impulse(lane_of(c), 1, block_of(c)) = sub%normal_impulse(c)
       end do
-      allocate (reaction(problem%kernels%nv, sub%n_columns), source=0.0_dp)
-      call problem%kernels%add_reaction(sub%pair, sub%hot, impulse, reaction)
+      allocate (reaction(problem%nv, sub%n_columns), source=0.0_dp)
+      call sub%add_reaction(problem%kernels, impulse, reaction)
     end associate
   end subroutine sum_impulses
 
   !> Leave contacts of a solved problem out of the next ones: what sleeps bears their impulses from now on. Collective.
-  subroutine leave_out(problem, leaving, halo, decomposition)
+  subroutine leave_out(problem, leaving, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
     !> contacts all of whose grains sleep now, of each subdomain of this rank
     type(contacts_t), intent(in) :: leaving(:)
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
-    call change_held(problem, leaving, 1, halo, decomposition)
+    call change_held(problem, leaving, 1, views, decomposition)
   end subroutine leave_out
 
   !> Give back what was borne of the contacts that are in a problem again, in which the impulses kept have just been recalled.
   !> Collective.
-  subroutine take_back(problem, halo, decomposition)
+  subroutine take_back(problem, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
     type(contacts_t) :: returning(size(problem%sub))
     integer :: s, c
 
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => halo%view(s)%list)
+      associate (sub => problem%sub(s), list => views(s)%list)
         allocate (returning(s)%are(sub%n_contacts))
         do c = 1, sub%n_contacts
           returning(s)%are(c) = list%state(list%memory%touch_row, sub%source(c)) == 1
         end do
       end associate
     end do
-    call change_held(problem, returning, 0, halo, decomposition)
+    call change_held(problem, returning, 0, views, decomposition)
   end subroutine take_back
 
   !> Mark contacts as left out (1) or as solved (0), and add their impulses to what sleeping bodies bear, or take them away.
   !> Collective.
-  subroutine change_held(problem, some, mark, halo, decomposition)
+  subroutine change_held(problem, some, mark, views, decomposition)
     type(contact_problem_t), intent(in) :: problem
     type(contacts_t), intent(in) :: some(:)
     integer, intent(in) :: mark
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(decomposition_t), intent(inout) :: decomposition
     type(impulses_t) :: borne(size(decomposition%owned))
     integer :: s, c, k
@@ -167,9 +168,9 @@ contains
       changes = changes .or. any(some(s)%are)
     end do
     if (.not. decomposition%comm%any_true(changes)) return
-    call find_borne(decomposition, halo, problem, some, mark == 1, borne)
+    call find_borne(decomposition, views, problem, some, mark == 1, borne)
     do s = 1, size(some)
-      associate (list => halo%view(s)%list)
+      associate (list => views(s)%list)
         do c = 1, size(some(s)%are)
           if (some(s)%are(c)) list%state(list%memory%touch_row, problem%sub(s)%source(c)) = mark
         end do
@@ -179,7 +180,7 @@ contains
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
           if (.not. owned%sleeps(k) .or. .not. any(abs(borne(s)%on(:, k)) > 0.0_dp)) cycle
-          owned%held(1:problem%kernels%nv, k) = owned%held(1:problem%kernels%nv, k) + (2*mark - 1)*borne(s)%on(:, k)
+          owned%held(1:problem%nv, k) = owned%held(1:problem%nv, k) + (2*mark - 1)*borne(s)%on(:, k)
           owned%steady(k) = .false.
         end do
       end associate

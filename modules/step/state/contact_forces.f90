@@ -3,7 +3,8 @@ module gravier_contact_forces
   use gravier_kinds, only: dp, i8
   use gravier_given_contacts, only: given_contacts_t
   use gravier_contact_kernels, only: global_moment, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_contact_places, only: find_contact_place
@@ -27,7 +28,7 @@ contains
     integer :: s, k, c, b, n, nd
 
     associate (boundaries => decomposition%boundaries)
-      nd = problem%kernels%nd
+      nd = problem%nd
       n = 0
       do s = 1, size(problem%sub)
         do c = 1, problem%sub(s)%n_contacts
@@ -37,7 +38,7 @@ contains
       contacts%n = n
       contacts%total = problem%comm%total(int(n, i8))
       allocate (contacts%candidate(n), contacts%antagonist(n), contacts%normal(nd, n), contacts%force(nd, n), contacts%point(nd, n))
-      if (problem%kernels%row%rolling_radius > 0) allocate (contacts%moment(2*nd - 3, n))
+      if (problem%has_rolling()) allocate (contacts%moment(2*nd - 3, n))
       if (halo%memory%n_spring > 0) allocate (contacts%elongation(nd, n))
       allocate (contacts%boundary(size(boundaries)))
       do b = 1, size(boundaries)

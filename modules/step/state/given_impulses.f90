@@ -15,10 +15,11 @@ module gravier_given_impulses
   use gravier_given_contacts, only: given_contacts_t, find_ranks
   use gravier_boundary, only: boundary_t
   use gravier_contact_kernels, only: kernels_t, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   use gravier_physics, only: physics_t
   use gravier_contact_springs, only: stretch_spring, put_elongation
   use gravier_contact_places, only: find_contact_place
@@ -42,23 +43,23 @@ module gravier_given_impulses
 contains
 
   !> Put impulses of given forces over a step into the memory of the pairs that touch, and stretch their springs. Collective.
-  subroutine take_given_impulses(given, decomposition, physics, problem, halo, started)
+  subroutine take_given_impulses(given, decomposition, physics, problem, views, started)
     type(given_contacts_t), intent(in) :: given
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     !> of the first step
     type(contact_problem_t), intent(inout) :: problem
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     type(started_t), intent(out) :: started
     integer(i8), allocatable :: records(:, :), pairs(:, :), mine(:, :)
     real(dp), allocatable :: pressing(:)
     integer :: k
 
     call pack_given(given, decomposition%boundaries, records)
-    call list_pairs(problem, halo, pairs)
+    call list_pairs(problem, views, pairs)
     call bring_together(decomposition%comm, records, pairs, mine)
     allocate (pressing(size(mine, 2)))
-    call add_all(decomposition, physics, problem, pairs, mine, halo, pressing)
+    call add_all(decomposition, physics, problem, pairs, mine, views, pressing)
     started%given = given%total
     started%matched = decomposition%comm%total(count(pressing >= 0.0_dp, kind=i8))
     if (started%matched == 0) return
@@ -121,9 +122,9 @@ contains
   end subroutine pack_given
 
   !> The contacts of this rank as (4, contacts): candidate, antagonist, subdomain of this rank, contact; sorted.
-  subroutine list_pairs(problem, halo, pairs)
+  subroutine list_pairs(problem, views, pairs)
     type(contact_problem_t), intent(in) :: problem
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     integer(i8), allocatable, intent(out) :: pairs(:, :)
     integer(i8), allocatable :: unsorted(:, :)
     integer, allocatable :: order(:)
@@ -132,7 +133,7 @@ contains
     allocate (unsorted(4, sum(problem%sub%n_contacts)))
     n = 0
     do s = 1, size(problem%sub)
-      associate (view => halo%view(s), sub => problem%sub(s))
+      associate (view => views(s), sub => problem%sub(s))
         do c = 1, sub%n_contacts
           n = n + 1
           associate (i => view%list%candidate(sub%source(c)), j => view%list%antagonist(sub%source(c)))
@@ -205,13 +206,13 @@ contains
   end subroutine bring_together
 
   !> Add the forces of records to the contacts that they belong to.
-  subroutine add_all(decomposition, physics, problem, pairs, records, halo, pressing)
+  subroutine add_all(decomposition, physics, problem, pairs, records, views, pressing)
     type(decomposition_t), intent(in) :: decomposition
     type(physics_t), intent(in) :: physics
     type(contact_problem_t), intent(inout) :: problem
     !> of list_pairs; of bring_together
     integer(i8), intent(in), contiguous :: pairs(:, :), records(:, :)
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     !> (records): normal forces in size, -1 of records that belong to none [N]
     real(dp), intent(out) :: pressing(:)
     integer, allocatable :: order(:)
@@ -228,26 +229,26 @@ contains
         numbers(e) = transfer(records(n_words + e, k), 0.0_dp)
       end do
       s = narrow(records(3, k))
-      call find_nearest(decomposition, problem, halo, pairs, first_not_before(pairs, order, records(1:3, k)), numbers, c)
+      call find_nearest(decomposition, problem, views, pairs, first_not_before(pairs, order, records(1:3, k)), numbers, c)
       if (c == 0) cycle
       pressing(k) = abs(sum(numbers(1:3)*numbers(4:6)))
       if (problem%sub(s)%yields(c)) then
         if (numbers(13) < not_given) then
-          associate (nd => problem%kernels%nd)
-            call put_elongation(halo%view(s)%list, problem%sub(s), c, numbers(1:nd), numbers(13:12 + nd))
+          associate (nd => problem%nd)
+            call put_elongation(views(s)%list, problem%sub(s), c, numbers(1:nd), numbers(13:12 + nd))
           end associate
         else
-          call elongate(problem%sub(s), c, numbers(1:6), halo%view(s)%list)
+          call elongate(problem%sub(s), c, numbers(1:6), views(s)%list)
         end if
       end if
       numbers(4:6) = physics%h*numbers(4:6)
       numbers(10:12) = physics%h*numbers(10:12)
-      call add_impulse(problem%kernels, problem%sub(s), c, numbers, halo%view(s)%list)
+      call add_impulse(problem%kernels, problem%sub(s), c, numbers, views(s)%list)
     end do
     do s = 1, size(problem%sub)
-      call settle(problem%sub(s), halo%view(s)%list)
+      call settle(problem%sub(s), views(s)%list)
       do c = 1, problem%sub(s)%n_contacts
-        if (problem%sub(s)%yields(c)) call stretch_spring(halo%view(s)%list, problem%kernels, physics, c, problem%sub(s))
+        if (problem%sub(s)%yields(c)) call stretch_spring(views(s)%list, problem%kernels, physics, c, problem%sub(s))
       end do
     end do
   end subroutine add_all
@@ -273,20 +274,20 @@ contains
   end subroutine elongate
 
   !> Of the contacts of a pair, the nearest one to a place whose normal is within a right angle of that given; 0 for none.
-  subroutine find_nearest(decomposition, problem, halo, pairs, first, numbers, nearest)
+  subroutine find_nearest(decomposition, problem, views, pairs, first, numbers, nearest)
     type(decomposition_t), intent(in) :: decomposition
     type(contact_problem_t), intent(in) :: problem
-    type(halo_t), intent(in) :: halo
+    type(local_bodies_t), intent(in) :: views(:)
     !> of list_pairs, and the first contact of the pair
     integer(i8), intent(in), contiguous :: pairs(:, :)
     integer, intent(in) :: first
     !> of a record
     real(dp), intent(in) :: numbers(n_numbers)
     integer, intent(out) :: nearest
-    real(dp) :: place(problem%kernels%nd), way(problem%kernels%nd), least
+    real(dp) :: place(problem%nd), way(problem%nd), least
     integer :: k, c, s, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     nearest = 0
     least = huge(least)
     do k = first, size(pairs, 2)
@@ -295,7 +296,7 @@ contains
       c = narrow(pairs(4, k))
       associate (sub => problem%sub(s))
         if (.not. sum(sub%hot(lane_of(c), 1:nd, block_of(c))*numbers(1:nd)) > 0.0_dp) cycle
-        call find_contact_place(problem%kernels, halo%view(s), sub, c, place)
+        call find_contact_place(problem%kernels, views(s), sub, c, place)
       end associate
       way(:) = place - numbers(7:6 + nd)
       associate (length => decomposition%period%length(1:nd))
@@ -321,7 +322,7 @@ contains
     given(:) = numbers(4:6)
     pressing = sum(given*normal)
     radius = 1.0_dp
-    if (kernels%row%rolling_radius > 0) radius = sub%hot(lane_of(c), kernels%row%rolling_radius, block_of(c))
+    if (kernels%has_rolling()) radius = sub%hot(lane_of(c), kernels%row%rolling_radius, block_of(c))
     associate (impulse => list%impulse(:, sub%source(c)))
       impulse(1) = impulse(1) + pressing
       select case (kernels%nf)

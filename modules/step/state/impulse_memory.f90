@@ -8,7 +8,7 @@ module gravier_impulse_memory
     & moment_vectors, project_moments
   use gravier_contact_problem, only: contact_problem_t
   use gravier_neighbour_list, only: pair_memory_t
-  use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_halo, only: local_bodies_t
   implicit none
   private
   public :: memory_of, impulse_entries, keep_impulses, recall_impulses, list_impulses, match_impulses, pair_record
@@ -41,26 +41,26 @@ contains
   end function impulse_entries
 
   !> Keep the impulses of a solved problem with the pairs of the lists, whose memory has them. Between bodies that sleep they stay.
-  subroutine keep_impulses(problem, halo)
+  subroutine keep_impulses(problem, views)
     type(contact_problem_t), intent(in) :: problem
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    rolls = problem%kernels%rolling_row > 0
+    rolls = problem%has_rolling()
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => halo%view(s)%list)
+      associate (sub => problem%sub(s), list => views(s)%list)
         call list%forget_impulses()
         do g = 1, n_blocks(sub%n_contacts)
-          if (problem%kernels%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
-          if (problem%kernels%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
+          if (problem%nf == 3) call tangential_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), vector)
+          if (problem%nf == 3 .and. rolls) call moment_vectors(sub%hot(:, :, g), sub%impulse(:, :, g), moment)
           do q = 1, lanes
             ! without a normal impulse the tangential one is a zero of either sign, which no checkpoint tells apart; contacts of
             ! no effect have none
             if (.not. sub%impulse(q, 1, g) > 0.0_dp) cycle
             c = (g - 1)*lanes + q
-            if (problem%kernels%nf < 3) then
+            if (problem%nf < 3) then
               list%impulse(:, sub%source(c)) = sub%impulse(q, :, g)
             else
               list%impulse(1, sub%source(c)) = sub%impulse(q, 1, g)
@@ -75,32 +75,32 @@ contains
 
   !> Start the contacts from the impulses kept; a tangential vector is projected on the tangent plane of now; a
   !> moment keeps its vector. Contacts that pressed nothing start as they were packed.
-  subroutine recall_impulses(halo, problem)
-    type(halo_t), intent(in) :: halo
+  subroutine recall_impulses(views, problem)
+    type(local_bodies_t), intent(in) :: views(:)
     type(contact_problem_t), intent(inout) :: problem
     integer :: s, c, q, g
     real(dp) :: vector(lanes, 3), moment(lanes, 3)
     logical :: rolls
 
-    rolls = problem%kernels%rolling_row > 0
+    rolls = problem%has_rolling()
     vector(:, :) = 0.0_dp
     moment(:, :) = 0.0_dp
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), list => halo%view(s)%list)
+      associate (sub => problem%sub(s), list => views(s)%list)
         do g = 1, n_blocks(sub%n_contacts)
           do q = 1, min(lanes, sub%n_contacts - (g - 1)*lanes)
             c = (g - 1)*lanes + q
             associate (kept => list%impulse(:, sub%source(c)))
-              if (problem%kernels%nf == 3) vector(q, :) = kept(2:4)
-              if (problem%kernels%nf == 3 .and. rolls) moment(q, :) = kept(5:7)
+              if (problem%nf == 3) vector(q, :) = kept(2:4)
+              if (problem%nf == 3 .and. rolls) moment(q, :) = kept(5:7)
               if (.not. kept(1) > 0.0_dp) cycle
               sub%impulse(q, 1, g) = kept(1)
-              if (problem%kernels%nf < 3) sub%impulse(q, 2:, g) = kept(2:)
+              if (problem%nf < 3) sub%impulse(q, 2:, g) = kept(2:)
             end associate
           end do
           ! contacts of no effect have no normal, and no frame
-          if (problem%kernels%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
-          if (problem%kernels%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
+          if (problem%nf == 3) call project_tangential(sub%hot(:, :, g), vector, sub%impulse(:, :, g))
+          if (problem%nf == 3 .and. rolls) call project_moments(sub%hot(:, :, g), moment, sub%impulse(:, :, g))
           sub%impulse(q:, :, g) = 0.0_dp
         end do
       end associate
@@ -139,9 +139,11 @@ contains
   pure integer(i8) function antagonist_id(view, p) result(id)
     type(local_bodies_t), intent(in) :: view
     integer, intent(in) :: p
+    integer :: i, j
 
-    id = view%list%antagonist(p)
-    if (id > 0) id = view%bodies%id(view%list%antagonist(p))
+    call view%find_ends(p, i, j)
+    id = j
+    if (j > 0) id = view%bodies%id(j)
   end function antagonist_id
 
   !> Give impulses and states to the pairs of a list that have the same bodies; what the records do not have stays.

@@ -46,12 +46,12 @@ contains
     integer :: p, k, i, j, repeated, wanted
 
     call find_places(before%bodies%id, view%bodies%id, place)
-    call sort_by_candidate(before%list, kept, before%bodies%n, pair, first)
+    call sort_by_candidate(before%list, kept, before%n_bodies(), pair, first)
     repeated = 0
     do p = 1, view%list%n
       repeated = merge(0, repeated + 1, view%list%begins(p))
-      i = place(view%list%candidate(p))
-      j = view%list%antagonist(p)
+      call view%find_ends(p, i, j)
+      i = place(i)
       if (j > 0) j = place(j)
       if (i == 0 .or. j == 0) cycle
       wanted = repeated

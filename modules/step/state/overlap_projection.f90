@@ -5,8 +5,10 @@ module gravier_overlap_projection
   use gravier_kinds, only: dp
   use gravier_timers, only: start_timer, stop_timer, phase_projection
   use gravier_contact_kernels, only: kernels_t, lanes, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_cell_response, only: subtract_images
+  use gravier_boundary, only: boundary_t
   use gravier_decomposition, only: decomposition_t
   use gravier_nscdd, only: average_copies
   use gravier_velocity_return, only: take_displacements
@@ -67,8 +69,7 @@ contains
     logical :: has_driven
 
     call start_timer(phase_projection)
-    has_driven = any(decomposition%boundaries%free(1)) .or. any(decomposition%boundaries%free(2)) .or. &
-      & any(decomposition%boundaries%free(3))
+    has_driven = has_free(decomposition%boundaries)
     do s = 1, size(problem%sub)
       call lend(problem, s, h, allowed, borrowed(s))
     end do
@@ -88,7 +89,7 @@ contains
       end do
       if (excess(problem, borrowed) <= enough) exit
     end do
-    factor = reduction(problem, max(0.5_dp*decomposition%rule%alert_distance, allowed))
+    factor = reduction(problem, max(0.5_dp*decomposition%alert_distance(), allowed))
     do s = 1, size(problem%sub)
       problem%sub(s)%v_global(:, :) = factor*problem%sub(s)%velocity
       call give_back(problem, s, borrowed(s))
@@ -98,6 +99,17 @@ contains
     if (has_driven) call take_boundary_displacements(decomposition, problem)
     call stop_timer(phase_projection)
   end subroutine project_overlaps
+
+  !> Whether forces move some boundary along some axis.
+  pure logical function has_free(boundaries)
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer :: d
+
+    has_free = .false.
+    do d = 1, 3
+      has_free = has_free .or. any(boundaries%free(d))
+    end do
+  end function has_free
 
   !> One sweep over the blocks that are swept.
   subroutine sweep_runs(kernels, borrowed, sub)
@@ -157,7 +169,7 @@ contains
     type(borrowed_t), intent(inout) :: borrowed(:)
     integer :: s, k, c, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     excess = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -185,7 +197,7 @@ contains
     real(dp) :: longest
     integer :: s, b, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     longest = 0.0_dp
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_bodies
@@ -203,7 +215,7 @@ contains
     real(dp) :: part(size(problem%sub))
     integer :: s, b, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     part(:) = 0.0_dp
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -224,12 +236,12 @@ contains
     type(borrowed_t), intent(out) :: borrowed
     integer :: b, c, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     associate (sub => problem%sub(s))
-      allocate (borrowed%law(lanes, merge(2, 1, problem%kernels%nf > 1), size(sub%hot, 3)))
+      allocate (borrowed%law(lanes, merge(2, 1, problem%nf > 1), size(sub%hot, 3)))
       allocate (borrowed%work, mold=sub%impulse)
-      call problem%kernels%contact_velocity(sub%pair, sub%hot, sub%v_global, borrowed%work)
-      if (problem%cell%moves) call subtract_images(problem, s, borrowed%work)
+      call sub%contact_velocity(problem%kernels, sub%v_global, borrowed%work)
+      if (problem%cell_moves()) call subtract_images(problem, s, borrowed%work)
       call move_alloc(sub%impulse, borrowed%impulse)
       allocate (sub%impulse, mold=borrowed%impulse)
       allocate (borrowed%is_touched(sub%n_columns), borrowed%is_swept(size(sub%hot, 3)), source=.false.)
@@ -246,10 +258,10 @@ contains
         end associate
       end do
       borrowed%is_touched(sub%n_bodies + 1:) = .false.
-      if (problem%kernels%nf > 1) then
+      if (problem%nf > 1) then
         ! nothing turns then, and no moment is needed
-        borrowed%law(:, 2, :) = sub%hot(:, problem%kernels%friction_row, :)
-        sub%hot(:, problem%kernels%friction_row, :) = 0.0_dp
+        borrowed%law(:, 2, :) = sub%hot(:, problem%friction_row, :)
+        sub%hot(:, problem%friction_row, :) = 0.0_dp
       end if
       sub%velocity(:, :) = 0.0_dp
       sub%impulse(:, :, :) = 0.0_dp
@@ -285,10 +297,10 @@ contains
     type(borrowed_t), intent(inout) :: borrowed
     integer :: nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     associate (sub => problem%sub(s))
       sub%hot(:, nd + 1, :) = borrowed%law(:, 1, :)
-      if (problem%kernels%nf > 1) sub%hot(:, problem%kernels%friction_row, :) = borrowed%law(:, 2, :)
+      if (problem%nf > 1) sub%hot(:, problem%friction_row, :) = borrowed%law(:, 2, :)
       call move_alloc(borrowed%impulse, sub%impulse)
     end associate
   end subroutine give_back

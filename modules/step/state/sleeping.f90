@@ -21,12 +21,13 @@ module gravier_sleeping
   use gravier_sparse_exchange, only: sparse_exchange
   use gravier_contact_kernels, only: lane_of, block_of
   use gravier_body_mass, only: inverse_of_translation, multiply_mass
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_body_store, only: body_set_t
   use gravier_boundary, only: boundary_t
   use gravier_neighbour_list, only: neighbour_list_t
   use gravier_decomposition, only: decomposition_t
-  use gravier_halo, only: halo_t
+  use gravier_halo, only: local_bodies_t
   use gravier_velocity_return, only: find_senders
   use gravier_borne_impulses, only: contacts_t, find_seen, leave_out
   implicit none
@@ -74,11 +75,11 @@ contains
   !> Count the steps at rest of the grains of a solved problem, before its impulses are kept; those that fall asleep get the
   !> momentum that wakes them, and bear the contacts that are left out from now on. Grains that are in no contact start anew.
   !> Collective.
-  subroutine count_rest(rule, stops, halo, problem, decomposition)
+  subroutine count_rest(rule, stops, views, problem, decomposition)
     type(sleeping_rule_t), intent(in) :: rule
     !> grains may come to stand still: v_global of those at rest becomes zero
     logical, intent(in) :: stops
-    type(halo_t), intent(inout) :: halo
+    type(local_bodies_t), intent(inout) :: views(:)
     !> v_global is evaluated, and `reaction` what it is evaluated with
     type(contact_problem_t), intent(inout) :: problem
     type(decomposition_t), intent(inout) :: decomposition
@@ -87,7 +88,7 @@ contains
     integer :: s, b
 
     do s = 1, size(problem%sub)
-      call sum_impulses(decomposition%boundaries, halo%view(s)%list, problem%sub(s), problem%kernels%nv, rest(s)%sums)
+      call sum_impulses(decomposition%boundaries, views(s)%list, problem%sub(s), problem%nv, rest(s)%sums)
       call problem%shared%load(s, rest(s)%sums)
     end do
     call problem%shared%pass()
@@ -98,11 +99,11 @@ contains
     end do
     call problem%shared%pass()
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), view => halo%view(s), own => rest(s))
+      associate (sub => problem%sub(s), view => views(s), own => rest(s))
         call problem%shared%sum_copies(s, own%restless, mean=.false.)
         call find_seen(view%list, sub, own%seen)
         allocate (own%steps(sub%n_grains), source=0)
-        allocate (own%left(problem%kernels%nv, sub%n_grains))
+        allocate (own%left(problem%nv, sub%n_grains))
         own%left(:, :) = sub%v_global(:, 1:sub%n_grains)
         do b = 1, sub%n_grains
           if (.not. own%rests(b) .or. own%restless(1, b) > 0.0_dp) cycle
@@ -114,7 +115,7 @@ contains
       end associate
     end do
     call bring_home(rule, problem, rest, decomposition)
-    call leave_out(problem, leaving, halo, decomposition)
+    call leave_out(problem, leaving, views, decomposition)
   end subroutine count_rest
 
   !> l [N s]: twice the momentum that a body at rest may have, and that which wakes it.
@@ -180,7 +181,7 @@ contains
       do b = 1, sub%n_columns
         if (b <= sub%n_grains) then
           rest%rests(b) = rest%sums(2, b) <= settled*rest%sums(1, b) .and. &
-            & is_slow(sub, problem%kernels%nd, &
+            & is_slow(sub, problem%nd, &
             & 0.5_dp*waking_momentum(rule, problem, rest%sums(1, b), 1.0_dp/sub%inverse_mass(1, b)), b)
         else if (sub%boundary(b) > 0) then
           rest%rests(b) = .not. may_push(boundaries(sub%boundary(b)))
@@ -254,7 +255,7 @@ contains
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer, allocatable :: destination(:)
     logical, allocatable :: sends(:)
-    real(dp) :: left(problem%kernels%nv)
+    real(dp) :: left(problem%nv)
     integer :: s, b, k, r, h, place, n, round, d
 
     do s = 1, size(decomposition%owned)
@@ -298,7 +299,7 @@ contains
       call put(h, place, narrow(received(3, k)), transfer(received(4, k), 0.0_dp), left)
     end do
     ! a cell that moves carries all grains along
-    if (problem%cell%moves) return
+    if (problem%cell_moves()) return
     do s = 1, size(decomposition%owned)
       call decomposition%owned(s)%awake%leave_out(decomposition%owned(s)%wakes_at)
     end do

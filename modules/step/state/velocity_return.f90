@@ -34,7 +34,7 @@ contains
         end do
       end associate
     end do
-    if (problem%cell%moves) call carry_grains(decomposition, problem%cell)
+    if (problem%cell_moves()) call carry_grains(decomposition, problem%cell)
     call bring_home(decomposition, problem, displace=.false.)
   end subroutine take_velocities
 
@@ -55,7 +55,7 @@ contains
     logical, intent(in) :: displace
     integer(i8), allocatable :: records(:, :), received(:, :)
     integer, allocatable :: destination(:)
-    real(dp) :: v(problem%kernels%nv)
+    real(dp) :: v(problem%nv)
     integer :: s, b, k, d, h, place
 
     do s = 1, size(problem%sub)
@@ -142,13 +142,13 @@ contains
             destination(n) = decomposition%comm%rank_of(sub%owner(b), decomposition%n_subdomains)
             records(1, n) = sub%owner(b)
             records(2, n) = sub%id(b)
-            do d = 1, problem%kernels%nv
+            do d = 1, problem%nv
               records(2 + d, n) = transfer(sub%v_global(d, b), 0_i8)
             end do
           end do
         end associate
       end do
-      if (round == 1) allocate (records(2 + problem%kernels%nv, n), destination(n))
+      if (round == 1) allocate (records(2 + problem%nv, n), destination(n))
     end do
   end subroutine list_returns
 

@@ -34,7 +34,8 @@ module gravier_velocity_scale
   use gravier_boundary_levers, only: find_levers
   use gravier_imposed_motion, only: imposed_motion_t, find_imposed, largest_imposed
   use gravier_contact_kernels, only: lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_physics, only: physics_t
   implicit none
@@ -154,8 +155,7 @@ contains
     integer :: s
 
     call find_imposed(decomposition%nd, decomposition%boundaries, self%lever, self%diameter, physics, motion)
-    self%drive = largest_imposed(decomposition%nd, decomposition%boundaries, self%lever, self%diameter, physics, &
-      & time, motion)
+    self%drive = largest_imposed(decomposition%nd, decomposition%boundaries, self%lever, self%diameter, physics, time, motion)
     self%restitution = physics%laws%most_restitution
     self%load = self%load_of(decomposition%nd, decomposition%boundaries, physics, time, area)
     idle = .not. (self%load > 0.0_dp .or. self%drive > 0.0_dp)
@@ -165,7 +165,7 @@ contains
       if (idle) call add_impulses(problem%sub(s), parts(3:4, s))
       call add_masses(problem%sub(s), parts(5:7, s))
       if (physics%laws%yields) call add_stiffness(problem%sub(s), parts(8:9, s))
-      call add_grains(problem%sub(s), physics, motion%common, problem%kernels%row%arm_i > 0, parts(10:, s))
+      call add_grains(problem%sub(s), physics, motion%common, problem%has_shapes(), parts(10:, s))
       call add_driven(problem%sub(s), decomposition%boundaries, motion%common, parts(10:, s))
     end do
     call problem%comm%sum_parts(parts, sums)
@@ -349,7 +349,7 @@ contains
     !> number, mass and squared masses of the grains in contact
     real(dp), intent(in) :: masses(3)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: v(problem%kernels%nd), own, limit, least, mean
+    real(dp) :: v(problem%nd), own, limit, least, mean
     logical :: moves, is_uneven
     integer :: s, b
 
@@ -368,7 +368,7 @@ contains
           if (.not. moves) cycle
           call find_own_velocity(sub, physics, b, v)
           own = norm2(v - frame(1:size(v)))
-          if (problem%kernels%row%arm_i > 0) own = hypot(own, sqrt(square_of_spin(sub, b, size(v))))
+          if (problem%has_shapes()) own = hypot(own, sqrt(square_of_spin(sub, b, size(v))))
           own = max(least, self%share*own)
           if (own < limit) sub%concern(b) = (limit/own)**2*max(1.0_dp, self%mass*sub%inverse_mass(1, b))
         end do

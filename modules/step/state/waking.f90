@@ -96,10 +96,10 @@ contains
     !> (bodies) sleeping grains near boundaries that move
     logical, allocatable, intent(out) :: exposed(:)
     integer, allocatable :: watched(:)
-    logical :: asleep(view%bodies%n), sleeps_i, sleeps_j
+    logical :: asleep(view%n_bodies()), sleeps_i, sleeps_j
     integer :: p, n, b
 
-    allocate (exposed(view%bodies%n), source=.false.)
+    allocate (exposed(view%n_bodies()), source=.false.)
     asleep(:) = view%bodies%wakes_at > 0.0_dp
     if (allocated(view%asleep)) then
       if (all(asleep .eqv. view%asleep)) return
@@ -155,8 +155,8 @@ contains
     do s = 1, size(problem%sub)
       allocate (every(s)%are(problem%sub(s)%n_contacts), source=.true.)
     end do
-    call find_borne(decomposition, halo, problem, every, .false., borne)
-    call wake_moved(decomposition, physics, problem%kernels%nw, borne, woken)
+    call find_borne(decomposition, halo%view, problem, every, .false., borne)
+    call wake_moved(decomposition, physics, problem%nw, borne, woken)
     woken = decomposition%comm%any_true(woken)
     if (.not. woken) return
     call halo%refresh(decomposition)
@@ -227,20 +227,19 @@ contains
     type(halo_t), intent(inout) :: halo
     type(marks_t) :: around(size(halo%view))
     logical, allocatable :: stays(:)
-    integer :: s, p
+    integer :: s, p, i, j
 
     if (.not. some_leave(decomposition)) return
     do s = 1, size(halo%view)
-      associate (view => halo%view(s), list => halo%view(s)%list)
+      associate (view => halo%view(s))
         call find_staying(decomposition, view%bodies, stays)
-        allocate (around(s)%of(view%bodies%n), source=.false.)
-        do p = 1, list%n
-          if (list%antagonist(p) < 0) cycle
-          associate (i => list%candidate(p), j => list%antagonist(p))
-            if (stays(i) .eqv. stays(j)) cycle
-            if (view%bodies%sleeps(i)) around(s)%of(i) = .true.
-            if (view%bodies%sleeps(j)) around(s)%of(j) = .true.
-          end associate
+        allocate (around(s)%of(view%n_bodies()), source=.false.)
+        do p = 1, view%list%n
+          call view%find_ends(p, i, j)
+          if (j < 0) cycle
+          if (stays(i) .eqv. stays(j)) cycle
+          if (view%bodies%sleeps(i)) around(s)%of(i) = .true.
+          if (view%bodies%sleeps(j)) around(s)%of(j) = .true.
         end do
       end associate
     end do
@@ -252,15 +251,14 @@ contains
     type(local_bodies_t), intent(in) :: view
     !> (bodies)
     logical, allocatable, intent(out) :: around(:)
-    logical :: woken(view%bodies%n)
+    logical :: woken(view%n_bodies())
     integer :: p, i, j
 
-    allocate (around(view%bodies%n), source=.false.)
+    allocate (around(view%n_bodies()), source=.false.)
     woken(:) = view%asleep .and. .not. view%bodies%wakes_at > 0.0_dp
     if (.not. any(woken)) return
     do p = 1, view%list%n
-      i = view%list%candidate(p)
-      j = view%list%antagonist(p)
+      call view%find_ends(p, i, j)
       if (j < 0) cycle
       if (woken(i) .and. view%bodies%sleeps(j)) around(j) = .true.
       if (woken(j) .and. view%bodies%sleeps(i)) around(i) = .true.
@@ -284,7 +282,7 @@ contains
     n = 0
     do s = 1, size(marked)
       associate (view => halo%view(s))
-        do k = 1, view%bodies%n
+        do k = 1, view%n_bodies()
           if (.not. marked(s)%of(k)) cycle
           n = n + 1
           destination(n) = decomposition%comm%rank_of(view%owner(k), decomposition%n_subdomains)

@@ -4,7 +4,8 @@ module gravier_whole_problem
   use gravier_sorting, only: argsort, find_sorted
   use gravier_shared_exchange, only: shared_exchange_t
   use gravier_boundary, only: boundary_words
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: halo_t
   use gravier_interface, only: interface_statistics_t
@@ -40,7 +41,7 @@ contains
     do s = 1, size(halo%view)
       associate (view => halo%view(s))
         call move_alloc(view%bodies%wakes_at, aside(s)%wakes_at)
-        allocate (view%bodies%wakes_at(view%bodies%n), source=0.0_dp)
+        allocate (view%bodies%wakes_at(view%n_bodies()), source=0.0_dp)
         call move_alloc(view%list%watched, aside(s)%watched)
         aside(s)%state = view%list%state
       end associate
@@ -50,7 +51,7 @@ contains
     do s = 1, size(whole%sub)
       whole%sub(s)%impulse(:, :, :) = 0.0_dp
     end do
-    call recall_impulses(halo, whole)
+    call recall_impulses(halo%view, whole)
     call whole%evaluate()
     do s = 1, size(halo%view)
       call take_velocities(solved%sub(s), whole%sub(s))

@@ -69,7 +69,7 @@ contains
     do s = 1, size(problem%sub)
       matrix%part(s)%body_work(:, :) = 0.0_dp
       do b = 1, problem%sub(s)%n_bodies
-        do d = 1, problem%kernels%nv
+        do d = 1, problem%nv
           matrix%part(s)%body_work(d, b) = copy_of(problem%sub(s)%id(b), problem%sub(s)%subdomain, d, trial)
         end do
       end do
@@ -89,9 +89,9 @@ contains
     type(enriched_matrix_t), intent(inout) :: matrix
     type(interface_field_t), allocatable, intent(out) :: f(:)
 
-    call make_field(problem, f)
+    call make_field(problem%shared, f)
     call fill(problem, trial, matrix)
-    call chain_differences(problem, matrix, f)
+    call chain_differences(problem%shared, matrix, f)
   end subroutine make_random
 
   !> A ties each copy to the next of the chain: the value of a sharer less that of the next one, the same on both sides;
@@ -116,7 +116,7 @@ contains
         do k = 1, part%n_shared
           most = max(most, part%multiplicity(k))
           at = part%first(k) + part%copy_rank(k) - 1
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             upper = 0.0_dp
             lower = 0.0_dp
             if (part%copy_rank(k) < part%multiplicity(k)) upper = copy_of(sub%id(part%body(k)), sub%subdomain, d, 1) - &
@@ -136,10 +136,10 @@ contains
     ! body_work := A^T g, against random values 1
     allocate (part(size(f)), source=0.0_dp)
     do s = 1, size(f)
-      call load_transpose(sim%problem, s, g(s), matrix)
+      call load_transpose(sim%problem%shared, s, g(s), matrix)
       associate (sub => sim%problem%sub(s))
         do k = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             part(s) = part(s) + matrix%part(s)%body_work(d, k)*copy_of(sub%id(k), sub%subdomain, d, 1)
           end do
         end do
@@ -194,11 +194,11 @@ contains
     integer :: s
 
     do s = 1, size(f)
-      call load_transpose(problem, s, f(s), matrix)
-      call matrix%solve(problem, s, matrix%part(s)%body_work, error)
+      call load_transpose(problem%shared, s, f(s), matrix)
+      call matrix%solve(problem%sub(s), s, matrix%part(s)%body_work, error)
     end do
-    call make_field(problem, xf)
-    call chain_differences(problem, matrix, xf)
+    call make_field(problem%shared, xf)
+    call chain_differences(problem%shared, matrix, xf)
     call check(.not. allocated(error), "X f")
   end subroutine apply
 
@@ -257,8 +257,8 @@ contains
     call prepare(comm, dimension, 9, friction, l, sim, matrix)
     call make_random(sim%problem, 1, matrix, f)
     call apply(sim%problem, matrix, f, b)
-    call make_field(sim%problem, by_factors)
-    call make_field(sim%problem, by_cg)
+    call make_field(sim%problem%shared, by_factors)
+    call make_field(sim%problem%shared, by_cg)
     call direct%prepare(sim%problem, matrix, error)
     call direct%solve(sim%problem, matrix, b, by_factors, error)
     call check(.not. allocated(error), "direct solution")
@@ -326,8 +326,8 @@ contains
 
     call prepare(over, dimension, 9, 0.3_dp, l, sim, matrix)
     call make_random(sim%problem, 4, matrix, b)
-    call make_field(sim%problem, f)
-    call make_field(sim%problem, g)
+    call make_field(sim%problem%shared, f)
+    call make_field(sim%problem%shared, g)
     call direct%prepare(sim%problem, matrix, error)
     call direct%solve(sim%problem, matrix, b, f, error)
     call cg%solve(sim%problem, matrix, b, g, error)
@@ -351,7 +351,7 @@ contains
 
     call prepare(comm, dimension, 9, 0.3_dp, 0.0_dp, sim, matrix)
     call make_random(sim%problem, 5, matrix, b)
-    call make_field(sim%problem, f)
+    call make_field(sim%problem%shared, f)
     call direct%prepare(sim%problem, matrix, error)
     call direct%solve(sim%problem, matrix, b, f, error)
     call check(.not. allocated(error), "closed form")
@@ -359,14 +359,14 @@ contains
     do s = 1, size(f)
       associate (part => sim%problem%shared%part(s), sub => sim%problem%sub(s))
         do k = 1, part%n_shared
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             mean = 0.0_dp
             do j = part%first(k), part%first(k + 1) - 1
               mean = mean + copy_of(sub%id(part%body(k)), part%sharer(j), d, 5)
             end do
             mean = mean/part%multiplicity(k)
             velocity = copy_of(sub%id(part%body(k)), sub%subdomain, d, 5) - &
-              & sub%weight(min(d, sim%problem%kernels%nw), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
+              & sub%weight(min(d, sim%problem%nw), part%body(k))*(f(s)%upper(d, k) - f(s)%lower(d, k))
             right = right .and. abs(velocity - mean) <= 100*epsilon(1.0_dp)
           end do
         end do
@@ -389,7 +389,7 @@ contains
 
     call prepare(comm, 2, 9, 0.3_dp, 20.0_dp, sim, matrix)
     call make_random(sim%problem, 1, matrix, b)
-    call make_field(sim%problem, f)
+    call make_field(sim%problem%shared, f)
     cg%max_iterations = 3
     call cg%solve(sim%problem, matrix, b, f, error)
     call check(allocated(error), "too few iterations are an error on every rank")
@@ -419,8 +419,8 @@ contains
     type(error_t), allocatable :: error
 
     call prepare(comm, 2, 1, 0.3_dp, 1.0_dp, sim, matrix)
-    call make_field(sim%problem, f)
-    call make_field(sim%problem, b)
+    call make_field(sim%problem%shared, f)
+    call make_field(sim%problem%shared, b)
     call direct%prepare(sim%problem, matrix, error)
     call direct%solve(sim%problem, matrix, b, f, error)
     call cg%prepare(sim%problem, matrix, error)

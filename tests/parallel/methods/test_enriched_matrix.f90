@@ -55,7 +55,7 @@ contains
     call matrix%start(sim%problem, error)
     call matrix%update(sim%problem, changed, error)
     call check(.not. allocated(error), "matrices")
-    nv = sim%problem%kernels%nv
+    nv = sim%problem%nv
     do s = 1, size(sim%problem%sub)
       call check_direction(sim%problem, s, l, relative, active, matrix)
       associate (sub => sim%problem%sub(s))
@@ -74,12 +74,12 @@ contains
         call sim%problem%kernels%add_reaction(sub%pair, sub%hot, v, b)
         do g = 1, sub%n_bodies
           do d = 1, nv
-            b(d, g) = b(d, g) + y(d, g)/sub%weight(min(d, sim%problem%kernels%nw), g)
+            b(d, g) = b(d, g) + y(d, g)/sub%weight(min(d, sim%problem%nw), g)
           end do
         end do
         scale = maxval(abs(b))
         b(:, sub%n_bodies + 1:) = 100.0_dp
-        call matrix%solve(sim%problem, s, b, error)
+        call matrix%solve(sim%problem%sub(s), s, b, error)
         ! M is above 0.4 kg (translation) or 5e-4 kg m^2 (spin): the error in y is the rounding of b over that
         call check_close(maxval(abs(b - y)), 0.0_dp, 1.0e5_dp*epsilon(1.0_dp)*max(scale, 1.0_dp), "solution; walls at rest")
         deallocate (y, b, v)
@@ -98,7 +98,7 @@ contains
     real(dp), intent(in) :: l
     logical, intent(in) :: relative, active
     type(enriched_matrix_t), intent(in) :: matrix
-    real(dp) :: expected(2), w(2), hot(problem%kernels%nh), impulse(problem%kernels%nc), found(problem%kernels%nc)
+    real(dp) :: expected(2), w(2), hot(problem%nh), impulse(problem%nc), found(problem%nc)
     integer :: c, d, closed, sliding, sticking
     logical :: right
 

@@ -8,7 +8,8 @@ module free_plate
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t
   use gravier_shared_exchange, only: shared_part_t
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method, only: method_t
   use gravier_enriched_matrix, only: enriched_matrix_t
   use gravier_nlgs, only: nlgs_t
@@ -41,7 +42,7 @@ contains
     integer :: s, first, last
 
     problem%comm => over
-    call problem%kernels%choose(dimension, effects_t(friction=friction > 0.0_dp))
+    call problem%choose_kernels(dimension, effects_t(friction=friction > 0.0_dp))
     problem%n_subdomains = n_subdomains
     first = over%first_subdomain(over%rank, n_subdomains)
     last = over%first_subdomain(over%rank + 1, n_subdomains) - 1
@@ -49,7 +50,7 @@ contains
     do s = first, last
       call make_part(problem, s, friction, problem%sub(s - first + 1), part(s - first + 1))
     end do
-    call problem%shared%init(over, part, n_subdomains, problem%kernels%nv)
+    call problem%shared%init(over, part, n_subdomains, problem%nv)
     problem%n_contacts = 4*n_columns - 2
     problem%force_scale = 1.0_dp
     problem%rounded_scale = 1.0_dp
@@ -68,7 +69,7 @@ contains
     integer, allocatable :: pair(:, :)
     integer :: number_of(plate), pairs(2, 4*n_columns), c, k, n, g, b, d, nd, first, last, n_sharers
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     first = 1 + (subdomain - 1)*n_columns/problem%n_subdomains
     last = subdomain*n_columns/problem%n_subdomains
     n = 0
@@ -88,11 +89,11 @@ contains
     sub%n_columns = sub%n_bodies
     sub%n_contacts = n
     allocate (sub%id(sub%n_bodies), sub%owner(sub%n_bodies), sub%multiplicity(sub%n_bodies))
-    allocate (sub%v_free(problem%kernels%nv, sub%n_bodies), source=0.0_dp)
+    allocate (sub%v_free(problem%nv, sub%n_bodies), source=0.0_dp)
     allocate (sub%velocity, sub%v_global, sub%reaction, mold=sub%v_free)
-    allocate (sub%inverse_mass(problem%kernels%nw, sub%n_bodies), source=0.0_dp)
+    allocate (sub%inverse_mass(problem%nw, sub%n_bodies), source=0.0_dp)
     allocate (sub%weight, mold=sub%inverse_mass)
-    allocate (pair(2, n), hot(problem%kernels%nh, n), impulse(problem%kernels%nc, n), sub%gap(n))
+    allocate (pair(2, n), hot(problem%nh, n), impulse(problem%nc, n), sub%gap(n))
     part%subdomain = subdomain
     allocate (part%body(plate), part%first(plate + 1), part%sharer(n_parts*plate), source=1)
     n_sharers = 0
@@ -114,7 +115,7 @@ contains
       else
         sub%v_free(nd, b) = sub%v_free(nd, b) - 1.0_dp
         sub%inverse_mass(1:nd, b) = 1.0_dp + hash_uniform(2, int(g, i8), 1)
-        if (problem%kernels%nw > nd) sub%inverse_mass(nd + 1, b) = 2.5_dp*sub%inverse_mass(1, b)
+        if (problem%nw > nd) sub%inverse_mass(nd + 1, b) = 2.5_dp*sub%inverse_mass(1, b)
       end if
     end do
     hot(:, :) = 0.0_dp
@@ -172,7 +173,7 @@ contains
         hot(1) = 1.0_dp
       end if
       hot(1:nd) = hot(1:nd)/norm2(hot(1:nd))
-      if (problem%kernels%nc == 1) return
+      if (problem%nc == 1) return
       hot(nd + 4) = 0.8_dp
       if (ij(2) /= plate) hot(nd + 5) = 0.8_dp
       hot(nd + 6) = friction
@@ -269,7 +270,7 @@ contains
         allocate (y, b, force, mold=sub%v_free)
         allocate (v, mold=sub%impulse)
         do g = 1, sub%n_bodies
-          do d = 1, problem%kernels%nv
+          do d = 1, problem%nv
             y(d, g) = merge(2*hash_uniform(9, sub%id(g), d) - 1.0_dp, 0.0_dp, sub%moves(d, g))
           end do
           b(:, g) = y(:, g)
@@ -280,7 +281,7 @@ contains
         force(:, :) = 0.0_dp
         call problem%kernels%add_reaction(sub%pair, sub%hot, v, force)
         b(:, :) = b + force
-        call matrix%solve(problem, s, b, error)
+        call matrix%solve(problem%sub(s), s, b, error)
         call check_close(maxval(abs(b - y)), 0.0_dp, 1.0e-13_dp, "matrix of a plate that is held along some axes")
         deallocate (y, b, force, v)
       end associate
@@ -324,13 +325,13 @@ contains
     velocity(:, :) = -huge(1.0_dp)
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_bodies
-        velocity(1:problem%kernels%nv, problem%sub(s)%id(b)) = problem%sub(s)%v_global(:, b)
+        velocity(1:problem%nv, problem%sub(s)%id(b)) = problem%sub(s)%v_global(:, b)
       end do
     end do
     do b = 1, plate
       call problem%comm%highest_of(velocity(:, b))
     end do
-    velocity(problem%kernels%nv + 1:, :) = 0.0_dp
+    velocity(problem%nv + 1:, :) = 0.0_dp
   end subroutine gather
 
 end module free_plate

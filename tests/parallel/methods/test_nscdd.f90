@@ -5,7 +5,8 @@ program test_nscdd
   use gravier_errors, only: error_t
   use gravier_random_hash, only: hash_uniform
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_nlgs, only: nlgs_t
   use gravier_nscdd, only: average_copies
   use gravier_solve, only: solve_contacts
@@ -56,7 +57,7 @@ contains
       associate (sub => sim%problem%sub(s))
         call sub%share_masses(sim%problem%kernels, .true.)
         do b = 1, sub%n_bodies
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             sub%velocity(d, b) = copy_of(sub%id(b), sub%subdomain, d)
           end do
         end do
@@ -71,7 +72,7 @@ contains
       associate (sub => sim%problem%sub(s), part => sim%problem%shared%part(s))
         do k = 1, part%n_shared
           b = part%body(k)
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             expected = 0.0_dp
             do j = part%first(k), part%first(k + 1) - 1
               expected = expected + copy_of(sub%id(b), part%sharer(j), d)
@@ -82,7 +83,7 @@ contains
         end do
         do b = 1, sub%n_bodies
           if (sub%multiplicity(b) > 1) cycle
-          do d = 1, sim%problem%kernels%nv
+          do d = 1, sim%problem%nv
             unshared = unshared .and. abs(sub%velocity(d, b) - copy_of(sub%id(b), sub%subdomain, d)) <= 0.0_dp
           end do
         end do
@@ -93,7 +94,7 @@ contains
     call check_copies(sim%problem, same)
     call check(same, "copies with the same bits")
     ! some hundred bodies of mass below 5 each
-    do d = 1, sim%problem%kernels%nv
+    do d = 1, sim%problem%nv
       call check_close(after(d), before(d), 500*rounding, "momentum")
     end do
     call sim%free()
@@ -116,8 +117,8 @@ contains
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
         do b = 1, sub%n_bodies
-          do d = 1, problem%kernels%nv
-            parts(d, s) = parts(d, s) + sub%velocity(d, b)/sub%weight(min(d, problem%kernels%nw), b)
+          do d = 1, problem%nv
+            parts(d, s) = parts(d, s) + sub%velocity(d, b)/sub%weight(min(d, problem%nw), b)
           end do
         end do
       end associate
@@ -237,7 +238,7 @@ contains
     real(dp), allocatable :: part(:), v(:, :, :)
     integer :: s, b, nd
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     call problem%evaluate()
     allocate (part(size(problem%sub)), source=0.0_dp)
     do s = 1, size(problem%sub)
@@ -286,7 +287,7 @@ contains
     real(dp), allocatable, intent(out) :: velocity(:, :)
     integer :: s, b, g
 
-    allocate (velocity(problem%kernels%nv, n_grains), source=-huge(1.0_dp))
+    allocate (velocity(problem%nv, n_grains), source=-huge(1.0_dp))
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_bodies
         velocity(:, problem%sub(s)%id(b)) = problem%sub(s)%v_global(:, b)

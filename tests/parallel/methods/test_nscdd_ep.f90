@@ -116,8 +116,8 @@ contains
     integer :: s, b, d, k, nd, nv
     logical :: own, balanced
 
-    nd = sim%problem%kernels%nd
-    nv = sim%problem%kernels%nv
+    nd = sim%problem%nd
+    nv = sim%problem%nv
     own = .true.
     balanced = .true.
     select type (method => sim%method)
@@ -142,7 +142,7 @@ contains
               force(d, b) = force(d, b) + sub%velocity(d, b)/sub%weight(min(d, size(sub%weight, 1)), b)
             end do
           end do
-          call method%matrix%solve(sim%problem, s, force, error)
+          call method%matrix%solve(sim%problem%sub(s), s, force, error)
           part%body_work(:, :) = force
           deallocate (force)
         end associate
@@ -221,7 +221,7 @@ contains
     call problem%evaluate()
     allocate (part(size(problem%sub)))
     do s = 1, size(problem%sub)
-      associate (sub => problem%sub(s), nd => problem%kernels%nd)
+      associate (sub => problem%sub(s), nd => problem%nd)
         allocate (v, mold=sub%impulse)
         v(:, :, :) = 0.0_dp
         mean = 0.5_dp*(sub%v_global + sub%v_free)

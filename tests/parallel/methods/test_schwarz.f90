@@ -103,7 +103,7 @@ contains
     call make_lattice(comm, dimension, 9, friction, plain, sim)
     schwarz%relaxation = relaxation_t(0.375_dp, automatic=.false.)
     call schwarz%start(sim%problem, error)
-    allocate (expected(sim%problem%kernels%nv))
+    allocate (expected(sim%problem%nv))
     do n = 1, 4
       old = schwarz%load
       call schwarz%iterate(sim%problem, .false., jump, error)
@@ -142,9 +142,9 @@ contains
           sub%reaction(:, part%body(k)) = sub%reaction(:, part%body(k)) + load(s)%value(:, k)
         end do
         do b = 1, sub%n_bodies
-          do d = 1, problem%kernels%nv
+          do d = 1, problem%nv
             right = right .and. abs(sub%velocity(d, b) - sub%v_free(d, b) - &
-              & sub%inverse_mass(min(d, problem%kernels%nw), b)*sub%reaction(d, b)) <= rounding
+              & sub%inverse_mass(min(d, problem%nw), b)*sub%reaction(d, b)) <= rounding
           end do
         end do
       end associate
@@ -247,7 +247,7 @@ contains
       call check(.false., "a Schwarz-EC method")
     end select
     call method%start(sim%problem, error)
-    allocate (expected(sim%problem%kernels%nv))
+    allocate (expected(sim%problem%nv))
     do n = 1, 3
       old = method%load
       call method%iterate(sim%problem, .false., jump, error)
@@ -282,14 +282,14 @@ contains
     real(dp), allocatable :: h(:, :), l(:), carried(:), system(:, :), inverse_mass(:), force(:), right_side(:)
     integer :: b, d, k, nv, n
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     associate (sub => problem%sub(s), part => problem%shared%part(s))
       n = nv*sub%n_bodies
       call assemble_h(problem, s, h)
       allocate (inverse_mass(n), force(n), right_side(n), system(n, n))
       do b = 1, sub%n_bodies
         do d = 1, nv
-          inverse_mass((b - 1)*nv + d) = sub%inverse_mass(min(d, problem%kernels%nw), b)
+          inverse_mass((b - 1)*nv + d) = sub%inverse_mass(min(d, problem%nw), b)
           force((b - 1)*nv + d) = sub%v_free(d, b)/inverse_mass((b - 1)*nv + d)
         end do
       end do
@@ -299,7 +299,7 @@ contains
       end do
       allocate (l(size(h, 2)), carried(size(h, 2)))
       do d = 1, size(l)
-        associate (c => 1 + (d - 1)/problem%kernels%nc, i => 1 + mod(d - 1, problem%kernels%nc))
+        associate (c => 1 + (d - 1)/problem%nc, i => 1 + mod(d - 1, problem%nc))
           l(d) = matrix%part(s)%direction(lane_of(c), i, block_of(c))
           carried(d) = sub%impulse(lane_of(c), i, block_of(c)) + l(d)*matrix%part(s)%law_velocity(lane_of(c), i, block_of(c))
         end associate
@@ -328,11 +328,11 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s
     real(dp), allocatable, intent(out) :: h(:, :)
-    real(dp) :: jacobian(problem%kernels%nc, problem%kernels%nv, 2)
+    real(dp) :: jacobian(problem%nc, problem%nv, 2)
     integer :: c, i, j, nv, nc, side
 
-    nv = problem%kernels%nv
-    nc = problem%kernels%nc
+    nv = problem%nv
+    nc = problem%nc
     associate (sub => problem%sub(s))
       allocate (h(nv*sub%n_bodies, nc*sub%n_contacts), source=0.0_dp)
       do c = 1, sub%n_contacts

@@ -47,7 +47,7 @@ contains
   !> Impulses that follow from the pair, in the cone of friction.
   subroutine set_impulses(problem)
     type(contact_problem_t), intent(inout) :: problem
-    real(dp) :: impulse(problem%kernels%nc)
+    real(dp) :: impulse(problem%nc)
     integer :: s, c, d
     integer(i8) :: pair
 
@@ -56,7 +56,7 @@ contains
         do c = 1, sub%n_contacts
           pair = 1000*sub%id(sub%pair(1, c)) + sub%id(sub%pair(2, c))
           impulse(1) = max(0.0_dp, hash_uniform(4, pair, 1) - 0.3_dp)
-          do d = 2, problem%kernels%nc
+          do d = 2, problem%nc
             impulse(d) = 0.2_dp*impulse(1)*(hash_uniform(4, pair, d) - 0.5_dp)
           end do
           call put_contact_column(impulse, c, sub%impulse)
@@ -201,11 +201,11 @@ contains
     real(dp), allocatable :: lowest(:, :)
     integer :: s, b, d
 
-    allocate (velocity(problem%kernels%nv, n_grains), lowest(problem%kernels%nv, n_grains), source=-huge(1.0_dp))
+    allocate (velocity(problem%nv, n_grains), lowest(problem%nv, n_grains), source=-huge(1.0_dp))
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_bodies
         associate (g => problem%sub(s)%id(b))
-          do d = 1, problem%kernels%nv
+          do d = 1, problem%nv
             velocity(d, g) = max(velocity(d, g), problem%sub(s)%v_global(d, b))
             lowest(d, g) = max(lowest(d, g), -problem%sub(s)%v_global(d, b))
           end do
@@ -269,17 +269,17 @@ contains
     real(dp), intent(in) :: w(2)
     !> stays true where they agree
     logical, intent(inout) :: right
-    real(dp) :: column(problem%kernels%nh, 1), unit(problem%kernels%nc, 1), v(problem%kernels%nc)
+    real(dp) :: column(problem%nh, 1), unit(problem%nc, 1), v(problem%nc)
     real(dp), allocatable :: hot(:, :, :), impulse(:, :, :), change(:, :, :)
     integer, allocatable :: pair(:, :)
     integer :: d, nd, side, b
 
-    nd = problem%kernels%nd
+    nd = problem%nd
     associate (sub => problem%sub(s))
       call pack_pairs(sub%pair(:, c:c), pair)
       column(:, 1) = contact_column(sub%hot, c)
       call pack_columns(column, hot)
-      do d = 1, problem%kernels%nc
+      do d = 1, problem%nc
         unit(:, :) = 0.0_dp
         unit(d, 1) = 1.0_dp
         call pack_columns(unit, impulse)
@@ -288,7 +288,7 @@ contains
         do side = 1, 2
           b = sub%pair(side, c)
           sub%reaction(1:nd, b) = sub%weight(1:nd, b)*sub%reaction(1:nd, b)
-          sub%reaction(nd + 1:, b) = sub%weight(problem%kernels%nw, b)*sub%reaction(nd + 1:, b)
+          sub%reaction(nd + 1:, b) = sub%weight(problem%nw, b)*sub%reaction(nd + 1:, b)
         end do
         call pack_columns(unit, change)
         call problem%kernels%contact_velocity(pair, hot, sub%reaction, change)

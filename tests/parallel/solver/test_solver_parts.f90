@@ -8,7 +8,8 @@ program test_solver_parts
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_memory_need, only: check_memory
   use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
-  use gravier_contact_problem, only: contact_problem_t, subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
+  use gravier_subproblem, only: subproblem_t
   use gravier_method, only: work_t
   use gravier_nlgs, only: nlgs_t
   use gravier_convergence_history, only: convergence_history_t
@@ -126,7 +127,7 @@ contains
     call make_column(n, subdomains, "&boundary shape = 'plane', point = -1, 0, normal = 1, 0 /"//newline// &
       & "&boundary shape = 'plane', point = -0.8, 0.4, normal = 0.8, 0.6 /"//newline// &
       & "&boundary shape = 'plane', point = 0.96, 0.72, normal = -0.96, 0.28 /"//newline//"&solver method = 'nscdd' /", sim)
-    call find_supports(sim%problem, supports)
+    call find_supports(sim%problem%sub, sim%problem%comm, sim%problem%load(1:sim%problem%nd), supports)
     do s = 1, size(supports)
       associate (sub => sim%problem%sub(s))
         do b = sub%n_grains + 1, sub%n_columns
@@ -143,7 +144,7 @@ contains
       do s = 1, size(ways)
         where (supports(s)%column) ways(s)%length = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_grains
           call check_close(ways(s)%length(b), sim%problem%sub(s)%id(b) - merge(0.0_dp, 0.5_dp, round == 1), rounding, &
@@ -152,7 +153,7 @@ contains
       end do
     end do
     sim%problem%load(:) = 0.0_dp
-    call find_supports(sim%problem, supports)
+    call find_supports(sim%problem%sub, sim%problem%comm, sim%problem%load(1:sim%problem%nd), supports)
     do s = 1, size(supports)
       call check(.not. any(supports(s)%column), "without a load nothing supports")
     end do
@@ -160,7 +161,7 @@ contains
     do s = 1, size(ways)
       associate (sub => sim%problem%sub(s))
         sub%gap(:) = 0.5_dp
-        sub%hot(:, sim%problem%kernels%nd + 1, :) = 0.5_dp
+        sub%hot(:, sim%problem%nd + 1, :) = 0.5_dp
       end associate
     end do
     call list_closed(sim%problem, ways)
@@ -669,7 +670,7 @@ contains
       & "&solver method = 'nscdd' /", sim)
     expected = 0.0_dp
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), row => sim%problem%kernels%row)
+      associate (sub => sim%problem%sub(s), row => sim%problem%row)
         call check(row%shift_t > 0, "the law has a shift along the tangent")
         do c = 1, sub%n_contacts
           ! nothing from the floor
@@ -726,7 +727,7 @@ contains
       & ", point = "//trim(merge("-1, 0   ", "-1, 0, 0", dimension == 2))//" /"//newline//"&solver method = 'nscdd' /", sim, &
       & dimension, rolling)
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels, row => sim%problem%kernels%row)
+      associate (sub => sim%problem%sub(s), kernels => sim%problem%kernels, row => sim%problem%row)
         nf = kernels%nf
         call check_equal(parts_of(kernels%nc, kernels%nv), merge(dimension, 1, rolling), "parts that the normal impulse bounds")
         call law%init(kernels, sub)
@@ -851,10 +852,10 @@ contains
       sim%problem%sub(s)%velocity(:, :) = sim%problem%sub(s)%v_global
       matrix%part(s)%law_velocity(:, :, :) = 0.0_dp
       matrix%part(s)%law_velocity(1, 1, 1) = v
-      call matrix%enrich(sim%problem, s, error)
+      call matrix%enrich(sim%problem%kernels, sim%problem%sub(s), s, error)
       call feedback%keep_lead(s, matrix)
     end do
-    call make_field(sim%problem, multipliers)
+    call make_field(sim%problem%shared, multipliers)
     call feedback%take(sim%problem, matrix, multipliers, error)
     call check(.not. allocated(error), "impulses are fed back")
     call check_close(feedback%share, min(1.0_dp, 0.75_dp/(0.75_dp*(0.75_dp + v))), rounding, "part of the way that is taken")

@@ -128,7 +128,7 @@ contains
         call check(all(ways(s)%length >= unreached), "no way is known before a root is")
         ways(s)%length(sim%problem%sub(s)%n_bodies + 1:) = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_bodies
           expected = place(sim%problem, s, b, count)
@@ -159,7 +159,7 @@ contains
           do c = 1, sub%n_contacts
             if (min(place(sim%problem, s, sub%pair(1, c), count), place(sim%problem, s, sub%pair(2, c), count)) /= cut) cycle
             sub%gap(c) = merge(0.09_dp, 0.11_dp, k == 1)*sim%problem%error_scale*step
-            sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
+            sub%hot(lane_of(c), sim%problem%row%shift, block_of(c)) = sub%gap(c)/step
           end do
         end associate
       end do
@@ -167,7 +167,7 @@ contains
       do s = 1, size(ways)
         ways(s)%length(sim%problem%sub(s)%n_bodies + 1:) = 0.0_dp
       end do
-      call shorten_ways(sim%problem, ways)
+      call shorten_ways(sim%problem%comm, sim%problem%shared, ways)
       do s = 1, size(ways)
         do b = 1, sim%problem%sub(s)%n_bodies
           call check((ways(s)%length(b) < unreached) .eqv. (k == 1 .or. place(sim%problem, s, b, count) <= cut), &
@@ -256,7 +256,7 @@ contains
           ! the contact of both parts is open
           sub%impulse(lane_of(c), 1, block_of(c)) = 0.0_dp
           sub%gap(c) = 2.0_dp*gravity*step**2
-          sub%hot(lane_of(c), sim%problem%kernels%row%shift, block_of(c)) = sub%gap(c)/step
+          sub%hot(lane_of(c), sim%problem%row%shift, block_of(c)) = sub%gap(c)/step
         end do
       end associate
     end do

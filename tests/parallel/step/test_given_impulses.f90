@@ -81,7 +81,7 @@ contains
   !> Impulses by the pair, the same whatever subdomain has it; every fourth pair has none.
   subroutine give_impulses(sim)
     type(simulation_t), intent(inout) :: sim
-    real(dp) :: impulse(sim%problem%kernels%nc)
+    real(dp) :: impulse(sim%problem%nc)
     integer(i8) :: pair
     integer :: s, c, e
 
@@ -193,8 +193,8 @@ contains
     call shuffle(listed, shuffled)
     call forget(sim)
     sim%physics%h = 0.5_dp
-    call take_given_impulses(shuffled, sim%decomposition, sim%physics, sim%problem, sim%halo, started)
-    call recall_impulses(sim%halo, sim%problem)
+    call take_given_impulses(shuffled, sim%decomposition, sim%physics, sim%problem, sim%halo%view, started)
+    call recall_impulses(sim%halo%view, sim%problem)
     call check_equal(started%given, listed%total, "contacts given")
     call check_equal(started%matched, listed%total, "contacts matched")
     call check_close(started%share, 1.0_dp, 4*epsilon(1.0_dp), "share of the normal forces")
@@ -242,7 +242,7 @@ contains
     listed%boundary(1) = "elsewhere"
     call forget(sim)
     sim%physics%h = 0.5_dp
-    call take_given_impulses(listed, sim%decomposition, sim%physics, sim%problem, sim%halo, started)
+    call take_given_impulses(listed, sim%decomposition, sim%physics, sim%problem, sim%halo%view, started)
     call check(comm%total(lost) > 10, "enough contacts that match nothing")
     call check_equal(started%matched, listed%total - comm%total(lost), "contacts matched, of "//to_text(listed%total))
     call check(started%share < 0.95_dp, "share of the normal forces")

@@ -157,7 +157,7 @@ contains
     call give_impulses(sim, owner)
     call check(count(owner > 0) > 50, "enough contacts to tell")
     ! what a step does after its solve
-    call keep_impulses(sim%problem, sim%halo)
+    call keep_impulses(sim%problem, sim%halo%view)
     call take_velocities(sim%decomposition, sim%physics, sim%problem)
     do s = 1, size(sim%decomposition%owned)
       associate (owned => sim%decomposition%owned(s))
@@ -188,7 +188,7 @@ contains
     zero = .true.
     fresh = 0
     do s = 1, size(sim%problem%sub)
-      associate (sub => sim%problem%sub(s), nc => sim%problem%kernels%nc)
+      associate (sub => sim%problem%sub(s), nc => sim%problem%nc)
         do c = 1, sub%n_contacts
           i = int(sub%id(sub%pair(1, c)))
           j = int(sub%id(sub%pair(2, c)))
@@ -337,7 +337,7 @@ contains
     ! the tangential vector of each pair (3, candidate, antagonist)
     allocate (kept(3, cloud%n, cloud%n), source=0.0_dp)
     call set_tangential(problem, kept)
-    call keep_impulses(problem, seen)
+    call keep_impulses(problem, seen%view)
     do s = 1, size(decomposition%owned)
       associate (owned => decomposition%owned(s))
         do k = 1, owned%n
@@ -350,7 +350,7 @@ contains
     call check(.not. seen%are_due(decomposition), "turned frames: the lists last")
     call seen%refresh(decomposition)
     call build_problem(decomposition, seen, kernels, physics, problem, figures)
-    call recall_impulses(seen, problem)
+    call recall_impulses(seen%view, problem)
     call check_projected(problem, kept)
   end subroutine test_turned_frames
 
@@ -383,11 +383,11 @@ contains
         call put_contact_column(impulse, c, problem%sub(s)%impulse)
       end do
     end do
-    call keep_impulses(problem, seen)
+    call keep_impulses(problem, seen%view)
     do s = 1, size(problem%sub)
       before = problem%sub(s)%impulse
       problem%sub(s)%impulse(:, :, :) = 0.0_dp
-      call recall_impulses(seen, problem)
+      call recall_impulses(seen%view, problem)
       call check(all(abs(problem%sub(s)%impulse - before) <= 32*epsilon(1.0_dp)), "forces and moments come back")
     end do
   end subroutine test_rolling
@@ -418,7 +418,7 @@ contains
   subroutine check_projected(problem, kept)
     type(contact_problem_t), intent(in) :: problem
     real(dp), intent(in) :: kept(:, :, :)
-    real(dp) :: t(3), u(3), expected(3), found(3), impulse(problem%kernels%nc), hot(problem%kernels%nh)
+    real(dp) :: t(3), u(3), expected(3), found(3), impulse(problem%nc), hot(problem%nh)
     integer(i8) :: turned, fresh
     integer :: s, c, i, j
     logical :: right
@@ -461,7 +461,7 @@ contains
 
     call make(2, 3, 0.3_dp, "partition = 'grid'", sim)
     call sim%assemble(figures)
-    call recall_impulses(sim%halo, sim%problem)
+    call recall_impulses(sim%halo%view, sim%problem)
     call check(.not. sim%problem%any_impulse(), "nothing kept, nothing recalled")
     call gather(sim, gathered)
     call check_equal(gathered, 0_i8, "zero impulses are not gathered")
@@ -470,7 +470,7 @@ contains
         sim%problem%sub(s)%impulse(lane_of(c), 1, block_of(c)) = 1.0_dp
       end do
     end do
-    call keep_impulses(sim%problem, sim%halo)
+    call keep_impulses(sim%problem, sim%halo%view)
     call gather(sim, gathered)
     call check_equal(comm%total(gathered), sim%problem%n_contacts, "all impulses are gathered")
     call sim%free()

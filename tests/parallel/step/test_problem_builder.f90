@@ -305,7 +305,7 @@ contains
     integer, intent(in) :: s, c, i, j
     type(truth_t), intent(in) :: truth
     real(dp), parameter :: rounding = 32*epsilon(1.0_dp)
-    real(dp) :: branch(truth%nd), gap, lever, hot(problem%kernels%nh)
+    real(dp) :: branch(truth%nd), gap, lever, hot(problem%nh)
     integer :: nd
 
     nd = truth%nd
@@ -318,7 +318,7 @@ contains
       right = all(abs(hot(1:nd)*norm2(branch) - branch) <= rounding)
       right = right .and. abs(sub%gap(c) - gap) <= rounding
       right = right .and. abs(hot(nd + 1) - max(gap, 0.0_dp)/h) <= rounding/h
-      if (problem%kernels%nc == 1) return
+      if (problem%nc == 1) return
       right = right .and. abs(hot(nd + 4) - truth%cloud%radius(i)) <= 0.0_dp
       right = right .and. abs(hot(nd + 5) - lever) <= 0.0_dp
       right = right .and. abs(hot(nd + 6) - merge(0.75_dp, 0.25_dp, j > n_grains)) <= 0.0_dp
@@ -412,7 +412,7 @@ contains
     integer :: s, b, d, g, nv
     logical :: right
 
-    nv = problem%kernels%nv
+    nv = problem%nv
     do s = 1, size(problem%sub)
       do b = 1, problem%sub(s)%n_bodies
         do d = 1, nv
@@ -466,7 +466,7 @@ contains
     halo%memory%n_impulse = 4
     call halo%build(decomposition)
     call build_problem(decomposition, halo, kernels, physics, problem, figures)
-    call check_equal(problem%kernels%nv, nd, "spins: unknowns of a body")
+    call check_equal(problem%nv, nd, "spins: unknowns of a body")
     small = .true.
     do s = 1, size(problem%sub)
       associate (sub => problem%sub(s))
@@ -632,7 +632,7 @@ contains
   subroutine check_floor(problem, s, c)
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
-    real(dp) :: hot(problem%kernels%nh)
+    real(dp) :: hot(problem%nh)
     integer :: j
 
     associate (sub => problem%sub(s))
@@ -675,7 +675,7 @@ contains
     type(contact_problem_t), intent(in) :: problem
     integer, intent(in) :: s, c
     logical, intent(in) :: turning
-    real(dp) :: hot(problem%kernels%nh)
+    real(dp) :: hot(problem%nh)
     integer :: i
 
     associate (sub => problem%sub(s))

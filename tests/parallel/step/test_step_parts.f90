@@ -798,7 +798,7 @@ contains
     do k = 1, size(sim%problem%sub)
       sim%problem%sub(k)%v_global(3, 1:sim%problem%sub(k)%n_grains) = 1.0_dp
     end do
-    call count_rest(sim%sleeping, .true., sim%halo, sim%problem, sim%decomposition)
+    call count_rest(sim%sleeping, .true., sim%halo%view, sim%problem, sim%decomposition)
     call check_equal(counted(sim, 1), 0, "a disk that spins is not at rest")
     do k = 1, 7
       call advance(sim, figures)
@@ -890,7 +890,7 @@ contains
     call check_equal(figures%asleep, 2_i8, "the two others sleep on")
     call check_equal(sim%problem%n_contacts, 1_i8, "the problem is that of the upper contact")
     call check_close(grain(sim, 3, 2), 0.0_dp, solved, "beside a sleeper that cannot move")
-    call find_supports(sim%problem, supports)
+    call find_supports(sim%problem%sub, sim%problem%comm, sim%problem%load(1:sim%problem%nd), supports)
     do s = 1, size(supports)
       call check(all(supports(s)%column(sim%problem%sub(s)%n_bodies + 1:)), "but bears what lies on it")
     end do

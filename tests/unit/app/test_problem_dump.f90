@@ -83,7 +83,7 @@ contains
 
     call make(disks, pile, "gravity = 0, -10, "//keys//" /"//newline//"&boundary shape = 'plane', point = 0, 0, normal = 0, 1, "// &
       & boundary//" /"//newline//groups, simulation, problem)
-    nv = simulation%problem%kernels%nv
+    nv = simulation%problem%nv
     call check_law(simulation, problem, friction, v)
     call check_equal(size(problem%mu), 7, "contacts of the pile: three with the floor, four of the disks")
     ! identifiers 2, 4, 17, 30; a floor that forces move comes behind them
@@ -135,7 +135,7 @@ contains
 
     call make(spheres, three_spheres, "dimension = 3, gravity = 0, 0, -10, "//keys//" /"//newline// &
       & "&boundary shape = 'plane', point = 0, 0, 0, normal = 0, 0, 1, velocity = 0.25, -0.5, 0.1 /", simulation, problem)
-    nv = simulation%problem%kernels%nv
+    nv = simulation%problem%nv
     call check_law(simulation, problem, friction, v)
     call check_equal(problem%dimension, 3, "dimension of space")
     call check_equal(size(v), 3*nv, "unknowns of three spheres")
@@ -227,7 +227,7 @@ contains
     integer :: nd, nv, c, b, i, n
 
     nd = problem%dimension
-    nv = simulation%problem%kernels%nv
+    nv = simulation%problem%nv
     do c = 1, size(problem%mu)
       n = 0
       other(:, :) = 0.0_dp

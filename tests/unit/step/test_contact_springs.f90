@@ -33,11 +33,11 @@ contains
     type(halo_t), intent(out) :: halo
     type(pair_memory_t) :: memory
 
-    call problem%kernels%choose(dimension, effects_t(friction=.true., compliance=.true.))
+    call problem%choose_kernels(dimension, effects_t(friction=.true., compliance=.true.))
     memory = memory_of(problem%kernels, .true., .false., .false., .false.)
     call check_equal(memory%n_spring, merge(1, 3, dimension == 2), "entries of an elongation")
     allocate (problem%sub(1), halo%view(1))
-    associate (sub => problem%sub(1), kernels => problem%kernels, row => problem%kernels%row, list => halo%view(1)%list)
+    associate (sub => problem%sub(1), kernels => problem%kernels, row => problem%row, list => halo%view(1)%list)
       call list%init(.false., 1)
       call list%add(1, -1, 0)
       call list%finish([1], memory)
@@ -79,7 +79,7 @@ contains
     expected%velocity(1:dimension) = velocity
     ! 1/W_nn is the mass; nothing turns
     call expected%damp(1.0_dp/mass, h, gap)
-    associate (sub => problem%sub(1), row => problem%kernels%row, list => halo%view(1)%list)
+    associate (sub => problem%sub(1), row => problem%row, list => halo%view(1)%list)
       call pack_spring(list, spring_t(), problem%kernels, physics, 1, velocity, sub)
       call check(.not. sub%yields(1), "a rigid contact")
       call check_close(sub%overlap(yielding=.false.), -gap, 0.0_dp, "overlap of a rigid contact")
@@ -112,14 +112,14 @@ contains
       sub%impulse(1, :, 1) = 0.7_dp
       v(:) = 0.2_dp
       if (dimension == 2) v(2) = -0.2_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       kept(:) = 0.0_dp
       do d = 2, dimension
         kept(d - 1) = expected%elongation(d, h, 0.7_dp, v(d), slides=.true.)
       end do
       call check_close(maxval(abs(list%spring(:, 1) - kept(1:size(list%spring, 1)))), 0.0_dp, rounding, "elongations are kept")
       call check(list%keeps(1), "a pair with an elongation is kept")
-      call spring_energies(problem, 1, halo, physics, energies)
+      call spring_energies(problem, 1, halo%view, physics, energies)
       call check_close(energies(1, 1), 400.0_dp*(gap - 0.5_dp*h*velocity(1))**2*merge(1.0_dp, 0.0_dp, gap < 0.5_dp*h*velocity(1)), &
         & rounding, "normal energy at the start")
       call check_close(energies(2, 1), 150.0_dp*sum((sub%spring(1)%stretch(:dimension - 1) - 0.5_dp*h*velocity(2:))**2)* &
@@ -131,16 +131,16 @@ contains
       call check_close(energies(2, 2), 150.0_dp*sum(carried(1:dimension - 1)**2), 10*rounding, "tangential energy where it slides")
       ! where it sticks, from what it was packed with on: the bodies have moved on, whatever the force is
       sub%hot(1, row%friction, 1) = 2.0_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       kept(1:2) = sub%spring(1)%stretch
       kept(1:dimension - 1) = kept(1:dimension - 1) + h*v(2:)
       call check_close(maxval(abs(list%spring(:, 1) - kept(1:size(list%spring, 1)))), 0.0_dp, rounding, &
         & "a contact that sticks is stretched by what its bodies move")
-      call spring_energies(problem, 1, halo, physics, energies)
+      call spring_energies(problem, 1, halo%view, physics, energies)
       call check_close(energies(2, 2), 150.0_dp*sum((kept(1:dimension - 1) - 0.5_dp*h*v(2:))**2), 10*rounding, &
         & "tangential energy where it sticks")
       sub%impulse(:, :, :) = 0.0_dp
-      call conclude_springs(problem, h, halo)
+      call conclude_springs(problem, h, halo%view)
       call check_close(maxval(abs(list%spring)), 0.0_dp, 0.0_dp, "a contact that carries nothing forgets")
       ! the bodies met half a step before q_m
       call pack_spring(list, spring, problem%kernels, physics, 1, velocity, sub)
