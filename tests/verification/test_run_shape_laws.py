@@ -293,7 +293,7 @@ class ShapeLaws(RunTestCase):
                            "spring_theta": 0.5}
                     case = shaped_case(dimension, [{**plane(dimension), "material": "m"}],
                                        {"scene": {"density": 1000.0, "friction": 0.0, "alert_distance": 0.01}, "material": [{"name": "m"}], "law": [law],
-                                        "time": {"step": 5e-5, "steps": 5000}, "output": {"energy": True}})
+                                        "time": {"step": 5e-5, "steps": 8000}, "output": {"energy": True}})
                     run = run_case(case, 1, directory)
                     self.assert_status(run, 0)
                     history = run.history()
