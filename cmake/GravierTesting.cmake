@@ -24,6 +24,8 @@ set(gravier_test_environment
   OMPI_MCA_pml=ob1 OMPI_MCA_btl=vader,self
   # ranks are not bound to processors, whose caches and distances would take half of the start of a program to find out
   HWLOC_COMPONENTS=no_os,stop
+  # nor are displays and accelerators looked for, whose libraries (OpenCL, X11) each start of MPI would load
+  HWLOC_PLUGINS_PATH=/nowhere
   OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
   # what Python compiles is kept here, for the next start of the same script, and nothing in the sources
   MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE= PYTHONPYCACHEPREFIX=${PROJECT_BINARY_DIR}/tests/pycache PYTHONPATH=${PROJECT_SOURCE_DIR}/tests/support

@@ -211,7 +211,7 @@ def prepare(kind, directory):
     if kind == "columns":
         return "gravier_columns", ["--count", "4", "--subdomains", "2", "--out", "disk/columns"]
     if kind == "bench":
-        return "gravier_bench", ["--quick", "--rounds", "1", "--seconds", "0.001", "--contacts", "1000", "--spheres", "1000", "--iterations", "2",
+        return "gravier_bench", ["--quick", "--rounds", "1", "--seconds", "0.001", "--contacts", "300", "--spheres", "300", "--iterations", "2",
                                  "--triad", "1000", "--csv", "disk/bench.csv"]
     return prepare_script(kind, directory)
 

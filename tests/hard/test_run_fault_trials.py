@@ -3,7 +3,11 @@ import os
 import subprocess
 import sys
 import unittest
+import unittest.mock
 
+import matplotlib.pyplot  # noqa: F401
+
+import forked_scripts
 from gravier_runs import LONG, RunTestCase
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
@@ -11,6 +15,16 @@ import fault_trials  # noqa: E402
 
 
 class FaultTrials(RunTestCase):
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        server = forked_scripts.Server(cls.scratch)
+        cls.addClassCleanup(server.stop)
+        # figures that programs draw, in a copy of this one; scripts of Gravier are started each by itself
+        instead = unittest.mock.patch.dict(os.environ, {"GRAVIER_PYTHON": server.interpreter(os.path.join(cls.scratch, "python3"))})
+        instead.start()
+        cls.addClassCleanup(instead.stop)
 
     def assert_right(self, figure, trials):
         print(figure, file=sys.stderr)

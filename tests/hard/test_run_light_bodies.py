@@ -1,6 +1,7 @@
 """Light bodies beside heavy ones, and columns of many heights: the velocity error of a solve is a mean by mass, which does not see
 them, and yet none of them may fall in a run that says that it has converged."""
 import os
+import re
 import unittest
 
 import numpy as np
@@ -30,6 +31,7 @@ SCENES = {
 }
 #: one domain, subdomains on one rank, and on two, where a solve of Schwarz takes ten times as long and has the same bits
 PLACES = {"nlgs": (1, 1), "nscdd": (4, 1), "schwarz": (4, 1), "nscdd on two ranks": (4, 2)}
+ON_RANKS = {"nscdd on two ranks"}
 
 
 class LightBodies(RunTestCase):
@@ -44,7 +46,8 @@ class LightBodies(RunTestCase):
             "time": {"step": STEP, "steps": STEPS},
             "solver": {"method": method.split()[0]},
             "decomposition": {"subdomains": subdomains},
-            "output": {"directory": "results", "every": 1, "contacts": False},
+            # states of several ranks take several times as long to write
+            "output": {"directory": "results", "every": 1 if ranks == 1 else STEPS // 3, "contacts": False},
         }, ranks, directory)
 
     def test_columns_are_held(self):
@@ -57,6 +60,8 @@ class LightBodies(RunTestCase):
                     self.assertIn("NO: ", run.stdout)
                     continue
                 self.assert_status(run, 0)
+                if method in ON_RANKS:
+                    continue
                 results = run.results()
                 fastest = [np.abs(results[f"/steps/{step}/bodies/velocity"]).max() for step in steps_of(results)]
                 self.assertEqual(len(fastest), STEPS + 1)
@@ -64,8 +69,11 @@ class LightBodies(RunTestCase):
                 self.assertLess(np.mean(fastest), MEAN_SPEED * GRAVITY * STEP)
         for name in SCENES:
             with self.subTest(name, what="ranks"):
-                one, two = (runs[name, method].results() for method in ("nscdd", "nscdd on two ranks"))
-                self.assertEqual(differences(one, two), [])
+                one, two = (dict(runs[name, method].results().items()) for method in ("nscdd", "nscdd on two ranks"))
+                written = steps_of(two)
+                self.assertEqual(written, [0, 20, 40, 60])
+                one = {key: value for key, value in one.items() if not key.startswith("/steps/") or int(re.split("[/@]", key)[2]) in written}
+                self.assertEqual([key for key in differences(one, two) if not key.startswith("/run")], [])
 
     def test_light_disk_lands(self):
         """A light disk comes down on the ground in the third step, beside a heavy one at rest: it does not go through."""

@@ -9,8 +9,10 @@ import re
 import shutil
 import unittest.mock
 
+import matplotlib.pyplot  # noqa: F401
 import numpy as np
 
+import forked_scripts
 from gravier_runs import LONG, SOURCE, RunTestCase, gravier, merged, namelist, run_case, write
 
 BALL = """id,shape,x,y,radius,nx,ny
@@ -43,6 +45,14 @@ def read(path):
 
 class Studies(RunTestCase):
 
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        server = forked_scripts.Server(cls.scratch)
+        cls.addClassCleanup(server.stop)
+        #: draws figures in a copy of this program, which has what they import
+        cls.python = server.interpreter(os.path.join(cls.scratch, "python3"))
+
     def study(self, title, case, study, *others, ranks=1, files=(), status=0, drawn=False):
         """Make a study of `case` in a directory of its own; its run and tables. Figures, which take longer than most studies, are drawn
         where they are looked at."""
@@ -56,7 +66,7 @@ class Studies(RunTestCase):
         if isinstance(values, str):
             text = text.replace("'" + values + "'", values)
         write(os.path.join(directory, "study.nml"), text + "\n".join(others))
-        with unittest.mock.patch.dict(os.environ, {} if drawn else {"GRAVIER_PYTHON": "true"}):
+        with unittest.mock.patch.dict(os.environ, {"GRAVIER_PYTHON": self.python if drawn else "true"}):
             run = gravier("study.nml", ranks=ranks, directory=directory, program="gravier_accuracy")
         self.assert_status(run, status)
         if status == 2:

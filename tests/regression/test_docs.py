@@ -318,6 +318,7 @@ class Blocks(unittest.TestCase):
         # scripts of Gravier and blocks of Python run in copies of this program, which has what they import
         self.server = forked_scripts.Server(str(self.directory))
         self.addCleanup(self.server.stop)
+        self.more["GRAVIER_PYTHON"] = self.server.interpreter(str(self.directory / "drawing"))
         for name in sorted(os.listdir(PROGRAMS)):
             if (PROGRAMS / name).resolve().suffix == ".py":
                 self.server.program(self.bin / name, str(PROGRAMS / name))

@@ -545,14 +545,14 @@ class BadInput(RunTestCase):
                 write(os.path.join(directory, "bodies.csv"), text)
             write(os.path.join(directory, "case.nml"), bodies_case("bodies.csv"))
             return "bodies.csv"
-        self.refuse_all(CSV_FILES, prepare_csv)
+        self.refuse_all(CSV_FILES, prepare_csv, 1 if LONG else 3)
 
     def test_hdf5_bodies(self):
         def prepare_hdf5(directory, bodies, walls):
             write_bodies(os.path.join(directory, "bodies.h5"), bodies, walls)
             write(os.path.join(directory, "case.nml"), bodies_case("bodies.h5"))
             return "bodies.h5"
-        self.refuse_all(HDF5_FILES, prepare_hdf5)
+        self.refuse_all(HDF5_FILES, prepare_hdf5, 1 if LONG else 3)
 
     def test_broken_hdf5(self):
         whole = write_bodies(self.here("whole.h5"), {}, {})

@@ -319,7 +319,7 @@ class Scales(RunTestCase):
         grains and then 15 mm behind them: there is no contact."""
         row = "".join(f"{k + 1},{0.03 * k!r},%s0,{RADIUS}\n" for k in range(5))
         flat = {"scene": {"dimension": 2, "bodies": "file", "bodies_file": "../row.csv", "density": DENSITY, "gravity": [0.0, 0.0]},
-                "time": {"step": 1e-3, "steps": 30}, "output": {"directory": "results"}}
+                "time": {"step": 1e-3, "steps": 30}, "output": {"directory": "results", "every": 0}}
         space = merged(flat, {"scene": {"dimension": 3, "bodies_file": "../space.csv", "gravity": [0.0, 0.0, 0.0]}})
         ram = {"name": "ram", "shape": "segment", "point": [-0.1, -0.39], "end": [0.3, -0.39]}
         plate = {"name": "ram", "shape": "rectangle", "point": [-0.1, -0.1, -0.39], "edge_a": [0.4, 0.0, 0.0],

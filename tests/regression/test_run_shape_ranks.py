@@ -22,8 +22,8 @@ PERIODIC = {"scene": {"period": [1.02, 0.0]}, "decomposition": {"partition": "gr
 # of each dimension
 METHODS = {
     2: {"nscdd": {}, "schwarz_ec": {"solver": {"method": "schwarz_ec"}, "time": {"steps": 120}}, "newton": {"solver": {"method": "newton"}}},
-    3: {"schwarz": {"solver": {"method": "schwarz", "sweeps": 2}, "time": {"steps": 200}},
-        "nscdd_ep": {"solver": {"method": "nscdd_ep"}, "time": {"steps": 200}},
+    3: {"schwarz": {"solver": {"method": "schwarz", "sweeps": 2}, "time": {"step": 4e-3, "steps": 100}},
+        "nscdd_ep": {"solver": {"method": "nscdd_ep"}, "time": {"step": 4e-3, "steps": 100}},
         "returned": {"scene": {"restitution": 0.2, "tangential_restitution": 0.2}, "solver": {"method": "newton"}}},
 }
 SLEEP = {"scene": {"restitution": 0.0}, "time": {"step": 4e-3, "steps": 220}, "output": {"every": 55},

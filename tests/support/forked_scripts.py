@@ -24,6 +24,15 @@ with socket.socket(socket.AF_UNIX) as server:
     server.shutdown(socket.SHUT_WR)
     sys.exit(int(server.recv(16)))
 """
+#: what python3 does with `-c STATEMENTS`, or with a script and its arguments
+INTERPRETER = """import os, runpy, sys
+del sys.argv[0]
+if sys.argv[0] == "-c":
+    exec(sys.argv[1])
+else:
+    sys.path[0] = os.path.dirname(os.path.realpath(sys.argv[0]))
+    runpy.run_path(sys.argv[0], run_name="__main__")
+"""
 
 
 def script(path, *arguments, directory=".", environment=None):
@@ -63,6 +72,13 @@ class Server:
         with open(place, "w", encoding="utf-8") as file:
             file.write(CALL.format(python=sys.executable, address=self.address, path=path))
         os.chmod(place, 0o755)
+
+    def interpreter(self, place):
+        """Make a program that stands for python3, for GRAVIER_PYTHON: programs start it to draw figures."""
+        with open(place + ".py", "w", encoding="utf-8") as file:
+            file.write(INTERPRETER)
+        self.program(place, place + ".py")
+        return place
 
     def stop(self):
         os.killpg(self.process, signal.SIGKILL)

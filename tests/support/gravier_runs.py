@@ -50,6 +50,8 @@ ENVIRONMENT = {
     "OMPI_MCA_pml": "ob1", "OMPI_MCA_btl": "vader,self",
     # ranks are not bound to processors, whose caches and distances would take half of the start of a program to find out
     "HWLOC_COMPONENTS": "no_os,stop",
+    # nor are displays and accelerators looked for, whose libraries (OpenCL, X11) each start of MPI would load
+    "HWLOC_PLUGINS_PATH": "/nowhere",
     # after a rank that failed the launcher would wait seconds for ranks that have left
     "OMPI_MCA_odls_base_sigkill_timeout": "0",
 }

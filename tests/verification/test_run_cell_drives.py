@@ -140,7 +140,7 @@ class CellDrives(CellTestCase):
         packing = {"scene": {"bodies": "lattice", "lattice_count": [6, 6], "radius_min": 0.4, "radius_max": 0.6, "density": 1.0, "gravity": [0.0, 0.0],
                              "overlap_projection": False, "period": [7.6, 7.6], "cell_shear_rate": [0.3], "cell_pressure": [0.0, 1.0]},
                    "time": {"step": 0.05, "steps": 160}, "solver": {"criterion": "residual", "tolerance": 1e-12, "max_iterations": 50000},
-                   "output": {"directory": "results", "every": 1, "final_bodies": True, "final_forces": True}}
+                   "output": {"directory": "results", "every": 10, "final_bodies": True, "final_forces": True}}
         space = {"scene": {"dimension": 3, "lattice_count": [4, 7, 4], "gravity": [0.0] * 3, "period": [5.1, 8.9, 5.1], "list_steps": 0.0,
                            "cell_shear_rate": [0.3, 0.0, 0.2], "cell_pressure": [0.0, 1.0, 0.0], "cell_strain_rate": [-0.03, 0.0, 0.0]},
                  "time": {"steps": 120}}

@@ -16,7 +16,7 @@ HEAP = {"scene": {"bodies": "lattice", "radius_min": 0.8 * RADIUS, "radius_max":
                   "wall_material": "m"},
         "material": {"name": "m"}, "time": {"step": STEP, "steps": STEPS},
         "solver": {"criterion": "residual", "tolerance": 1e-13, "max_iterations": 20000, "fallback": "none"},
-        "output": {"directory": "results", "every": 5, "final_bodies": True, "final_forces": True, "energy": True}}
+        "output": {"directory": "results", "every": STEPS, "final_bodies": True, "final_forces": True, "energy": True}}
 SPRINGS = {"materials": "m", "kind": "elastic", "friction": 0.4, "normal_stiffness": 2e4}
 
 

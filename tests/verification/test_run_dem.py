@@ -1,21 +1,26 @@
 """drivers/studies/study_dem.py: what it measures of grains against direct sums and known motions, its scenes as both codes read them,
 and its smallest part."""
+import contextlib
+import io
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
 from pathlib import Path
+from unittest import mock
 
+import matplotlib.pyplot  # noqa: F401
 import numpy as np
 
-from gravier_runs import PROGRAMS, SOURCE
+import forked_scripts
+from gravier_runs import LONG, PROGRAMS, SOURCE
 
 sys.path.insert(0, os.path.join(SOURCE, "drivers/studies"))
 os.environ.setdefault("GRAVIER_BIN_DIR", PROGRAMS)
 import dem_codes as codes  # noqa: E402
 import dem_scenes as scenes  # noqa: E402
+import study_dem  # noqa: E402
 
 STUDY = os.path.join(SOURCE, "drivers/studies/study_dem.py")
 
@@ -122,7 +127,7 @@ class Scenes(unittest.TestCase):
     def test_ranks(self):
         """Grains that settle on two ranks have a subdomain each, and are as dense as those on one; what is said of a wrong case is its error, and not
         the last words of the launcher."""
-        settling = self.settling()
+        settling = self.settling(5, 4, 8)
         found = []
         for ranks in (1, 2):
             place = settling.place / f"gravier{ranks}"
@@ -156,17 +161,34 @@ class Scenes(unittest.TestCase):
 class Command(unittest.TestCase):
 
     def run_study(self, *arguments):
-        return subprocess.run([sys.executable, STUDY, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+        return forked_scripts.script(STUDY, *arguments)
+
+    def run_small(self, *arguments):
+        """Status and text of the study with a box of a tenth of the grains, which settles too early for its bounds."""
+        class Small(scenes.Settling):
+            def __init__(self, *more):
+                super().__init__(*more)
+                self.width, self.depth, self.height, self.duration = 5 * scenes.CELL, 4 * scenes.CELL, 8 * scenes.CELL, 0.1
+
+        said = io.StringIO()
+        with mock.patch.object(study_dem, "Settling", Small), mock.patch.object(sys, "argv", [STUDY, *arguments]), contextlib.redirect_stdout(said):
+            return study_dem.main(), said.getvalue()
 
     def test_settling(self):
-        """With stored figures: physics is within its bounds, seconds are not compared, and the status tells whether a row is missed."""
+        """With stored figures: seconds are not compared, and the status tells whether a row is missed; in `./gravier test long` physics is within
+        its bounds."""
         with tempfile.TemporaryDirectory() as place:
-            run = self.run_study("--quick", "--parts", "settling", "--lammps", "none", "--out", place)
-            self.assertIn("stored figures of", run.stdout, run.stderr)
-            self.assertRegex(run.stdout, r"(?m)^settling +solid fraction .* yes$")
-            self.assertNotIn("seconds of LAMMPS", run.stdout)
-            self.assertIn("seconds are not compared", run.stdout)
-            self.assertEqual(run.returncode, 1 if " NO\n" in run.stdout else 0, run.stderr)
+            arguments = "--quick", "--parts", "settling", "--lammps", "none", "--out", place
+            if LONG:
+                run = self.run_study(*arguments)
+                status, text = run.returncode, run.stdout
+            else:
+                status, text = self.run_small(*arguments)
+            self.assertIn("stored figures of", text)
+            self.assertRegex(text, rf"(?m)^settling +solid fraction .* {'yes' if LONG else '(yes|NO)'}$")
+            self.assertNotIn("seconds of LAMMPS", text)
+            self.assertIn("seconds are not compared", text)
+            self.assertEqual(status, 1 if " NO\n" in text else 0)
             for name in ("study_dem.csv", "study_dem.md"):
                 self.assertTrue((Path(place) / name).exists(), name)
 

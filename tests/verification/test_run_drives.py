@@ -121,11 +121,11 @@ class Moves(SmallScene):
         ring, rate = 0.4, 3.0
         place = [0.0, -(ring - RADIUS)]
         circle = [{"shape": "circle", "point": [0.0, 0.0], "radius": ring, "rotation": rate, "friction": 0.3}]
-        steady = self.play("steady circle", [Grain(place, spin=rate * ring / RADIUS, radius=RADIUS)], circle, (0, -G), 400)
+        steady = self.play("steady circle", [Grain(place, spin=rate * ring / RADIUS, radius=RADIUS)], circle, (0, -G), 200)
         case = "disk in a turning circle"
         self.verify(case, "spin over Omega in the steady state", steady.spin / rate, ring / RADIUS, 1e-9)
         self.verify(case, "place of the disk in the steady state [m]", steady.position[:, 0], place, 1e-9)
-        slow = self.play("spun up", [Grain(place, radius=RADIUS)], circle, (0, -G), 1000)
+        slow = self.play("spun up", [Grain(place, radius=RADIUS)], circle, (0, -G), 750)
         middle = slow.position[:-1, 0] + 0.5 * self.step * slow.velocity[:-1, 0]
         out = middle / np.linalg.norm(middle, axis=1)[:, None]
         tangent = np.column_stack([-out[:, 1], out[:, 0]])
@@ -205,7 +205,7 @@ class Forces(SmallScene):
                         continue
                     groups = {"solver": {"method": method, "max_iterations": 100000, **more.get("solver", {})},
                               "decomposition": {"subdomains": parts}, "enriched": more.get("enriched", {})}
-                    record = self.play(f"piston {dimension} {method} {parts} {ranks}", grains, [piston], steps=10, ranks=ranks,
+                    record = self.play(f"piston {dimension} {method} {parts} {ranks}", grains, [piston], steps=5, ranks=ranks,
                                        **groups)
                     case = f"piston and {n} grains, {dimension}D, {method}, subdomains: {parts}"
                     speed = a * record.time[:, None]

@@ -209,7 +209,8 @@ class Boundaries(SmallScene):
         plates = [{"shape": "rectangle", "point": [0.2, side * 0.05, 0.0], "edge_a": [1.0, 0.0, 0.0], "edge_b": [0.0, side * 0.4, 0.0]}
                   for side in (1.0, -1.0)]
         runs = [self.play(f"slot on {ranks}", free, plates, [0.0, 0.0, -G], 150, ranks, solver={"method": "nscdd", "tolerance": 1e-4},
-                          decomposition={"subdomains": 2}, scene={"period": [1.0, 0.0, 0.0], "friction": 0.5}) for ranks in (1, 2)]
+                          decomposition={"subdomains": 2}, scene={"period": [1.0, 0.0, 0.0], "friction": 0.5}, output={"every": 10})
+                for ranks in (1, 2)]
         for name in ("position", "velocity", "image"):
             np.testing.assert_array_equal(getattr(runs[0], name), getattr(runs[1], name))
         # some are in the slot, others lie on the plates

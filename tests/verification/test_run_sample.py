@@ -275,7 +275,7 @@ class Samples(RunTestCase):
         refused = {
             "lattice": (merged(BASE, lattice) | {"sample": {}}, "bodies = 'lattice': expected 'sample'"),
             "ending": (merged(BASE, {"sample": {"file": "sample.csv"}}), "&sample file = 'sample.csv': expected a name with"),
-            "dense": (merged(BASE, {"sample": {"solid_fraction": 0.59}}), "solid fraction"),
+            "dense": (merged(BASE, {"sample": {"solid_fraction": 0.59, "count": 100}}), "solid fraction"),
             "narrow": (merged(BASE, {"sample": {"box": 0.01}}), "&sample box"),
             "nowhere": (merged(BASE, {"sample": {"file": "sample.nml/sample.h5"}}), "expected a file in a directory"),
             "table": (merged(CASES["table"], {"sample": {"radius_table": "missing.csv"}}), "missing.csv"),

@@ -147,7 +147,7 @@ class ShapeLaws(RunTestCase):
                 start = body("block", up(dimension, height), STILL[dimension], up(dimension, 0.0, rate * height), turning["rotation"])
                 # gravity would deform springs
                 run = self.play(f"turning boundary {dimension} {gap} {shape}", dimension, [start], [turning], *parts,
-                                {"scene": {"gravity": up(dimension, -G if gap > 0.0 else 0.0)}, "time": {"steps": 200}, "output": {"energy": True}})
+                                {"scene": {"gravity": up(dimension, -G if gap > 0.0 else 0.0)}, "time": {"steps": 200}, "output": {"energy": True, "every": 200}})
                 history = {name: np.array(floats(values)) for name, values in run.history().items() if "energy" in name or "dissipated" in name}
                 scale = 1000.0 * (2.0 * half)**dimension * G * half
                 self.assertLess(np.abs(history["energy_error"]).max(), 1e-10 * scale)
