@@ -171,25 +171,28 @@ contains
       & insertion%most_grains - insertion%entered)//" of its count of "//to_text(insertion%most_grains)//" are still to enter"
   end function insertion_line
 
-  !> That grains which rates owe have not entered, for the last words of a log; empty where they are few.
+  !> That grains which rates owe have not entered, for the last words of a log, of the insertions that lack more than a few; empty
+  !> where none does.
   function inflow_doubt(simulation) result(text)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable :: text
-    integer(i8) :: behind, entered
+    integer(i8) :: behind, owed, missing
     integer :: i
 
     text = ""
     behind = 0
-    entered = 0
+    owed = 0
     do i = 1, size(simulation%inflow%insertions)
       associate (insertion => simulation%inflow%insertions(i))
-        behind = behind + insertion%grains_behind(simulation%time) + &
+        missing = insertion%grains_behind(simulation%time) + &
           & nint(insertion%mass_behind(simulation%time)/insertion%mean_mass(), i8)
-        entered = entered + insertion%entered
+        if (missing <= one_waits .or. missing <= few_wait*(missing + insertion%entered)) cycle
+        behind = behind + missing
+        owed = owed + missing + insertion%entered
       end associate
     end do
-    if (behind <= one_waits .or. behind <= few_wait*(behind + entered)) return
-    text = "; "//to_text(behind)//" of the "//to_text(behind + entered)//" grains that rates of insertions owe have not entered"
+    if (behind == 0) return
+    text = "; "//to_text(behind)//" of the "//to_text(owed)//" grains that rates of insertions owe have not entered"
   end function inflow_doubt
 
   !> What keeps an insertion from its rate: full regions, the most that may enter in a step, or both.

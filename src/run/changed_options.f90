@@ -31,6 +31,8 @@ module gravier_changed_options
     logical :: accepts = .false.
     !> those that do
     type(growing_text_t) :: changes
+    !> of the group that is compared among those of its kind in a row
+    integer :: number = 0
   end type comparison_t
 
 contains
@@ -47,17 +49,22 @@ contains
     character(len=:), allocatable, intent(out) :: changes
     type(error_t), allocatable, intent(inout) :: error
     type(comparison_t) :: comparison
-    character(len=:), allocatable :: group_before, group_now
-    integer :: at_before, at_now
+    character(len=:), allocatable :: group_before, group_now, kind, last
+    integer :: at_before, at_now, at
 
     comparison%checkpoint = checkpoint
     comparison%input = input
     comparison%accepts = accepts
     at_before = 1
     at_now = 1
+    last = ""
     do while (at_before <= len(before) .or. at_now <= len(now))
       call next_group(before, at_before, group_before)
       call next_group(now, at_now, group_now)
+      at = 1
+      call next_line(group_now, at, kind)
+      comparison%number = merge(comparison%number + 1, 1, kind == last)
+      last = kind
       if (group_before /= group_now) call compare_groups(comparison, group_before, group_now, error)
       if (allocated(error)) exit
     end do
@@ -80,12 +87,13 @@ contains
     do while (at <= len(now) .and. .not. allocated(error))
       call next_line(now, at, line)
       was = line_of(before, key_of(line))
-      if (was /= line) call judge_option(comparison, group, title_of(now), was, line, error)
+      if (was /= line) call judge_option(comparison, group, title_of(now, comparison%number), was, line, error)
     end do
     at = 1
     do while (at <= len(before) .and. .not. allocated(error))
       call next_line(before, at, was)
-      if (line_of(now, key_of(was)) == nothing) call judge_option(comparison, group, title_of(now), was, nothing, error)
+      if (line_of(now, key_of(was)) == nothing) &
+        & call judge_option(comparison, group, title_of(now, comparison%number), was, nothing, error)
     end do
   end subroutine compare_groups
 
@@ -119,7 +127,7 @@ contains
       way = "a new run that begins with a state of this one: its final_bodies.h5, or a file of gravier.write_bodies"
       if (may_change(group, key)) way = "gravier --restart --changed, which goes on with the new value"
       call raise(error, status_input, comparison%input//": the scene is not that of "//comparison%checkpoint//": "// &
-        & trim(adjustl(is))//": expected "//trim(adjustl(was))//", or "//way)
+        & shown(is, key)//": expected "//shown(was, key)//", or "//way)
     end if
   end subroutine judge_option
 
@@ -140,9 +148,11 @@ contains
     end select
   end function may_change
 
-  !> What a group is called: its first line, with the name that it has.
-  function title_of(text) result(title)
+  !> What a group is called: its first line, with the name that it has; boundaries without one are called as in the log.
+  function title_of(text, number) result(title)
     character(len=*), intent(in) :: text
+    !> of the group among those of its kind
+    integer, intent(in) :: number
     character(len=:), allocatable :: title, name
     integer :: at
 
@@ -150,7 +160,11 @@ contains
     call next_line(text, at, title)
     name = line_of(text, "name")
     if (name == nothing) name = line_of(text, "materials")
-    if (name /= nothing .and. index(name, "!") == 0) title = title//" "//value_of(name)
+    if (title == "&boundary" .and. value_of(name) == value_of(nothing)) then
+      title = title//" 'boundary "//to_text(number)//"'"
+    else if (name /= nothing) then
+      title = title//" "//value_of(name)
+    end if
   end function title_of
 
   !> The line of a group that has a key, or nothing.
@@ -166,6 +180,19 @@ contains
     end do
     line = nothing
   end function line_of
+
+  !> An option with a key, or the line that begins a group, in a message.
+  pure function shown(line, key) result(text)
+    character(len=*), intent(in) :: line, key
+    character(len=:), allocatable :: text
+
+    text = trim(adjustl(line))
+    if (line == tables_group) then
+      text = "no further group"
+    else if (line == nothing .or. index(text, "!") == 1) then
+      text = key//" not given"
+    end if
+  end function shown
 
   !> The key of a line `  key = value`, or of `  ! key = where the value comes from`; else the line.
   pure function key_of(line) result(key)

@@ -193,7 +193,7 @@ with gravier.Simulation(case, quiet=True) as s:
         other = "or a new run that begins with a state of this one: its final_bodies.h5, or a file of gravier.write_bodies\n"
         for groups, words in (({"scene": {"radius_max": 0.013}}, f"radius_max = 0.013: expected radius_max = 0.012, {other}"),
                               ({"scene": {"gravity": [0.0, -1.0], "rotation": False}}, f"rotation = .false.: expected rotation = .true., {other}"),
-                              ({"boundary": longer["boundary"][:2]}, f"&(tables): expected &boundary, {other}"),
+                              ({"boundary": longer["boundary"][:2]}, f"no further group: expected &boundary, {other}"),
                               ({"boundary": [{**longer["boundary"][0], "point": [0.0, -0.02]}, *longer["boundary"][1:]]}, "point = 0.0, -0.02, 0.0: expected point = "),
                               ({"boundary": with_boundary(longer, 2, velocity=[0.0, 1.0, 0.0])["boundary"]}, "case.nml: &boundary 'lid' velocity: expected 0 along what forces "
                                "move: there the boundary goes on with the velocity that it has\n"),

@@ -59,6 +59,7 @@ contains
 
   subroutine values_that_may_change()
     character(len=:), allocatable :: changes, message
+    type(error_t), allocatable :: error
 
     call compare(with("friction = 0.3", "friction = 0.5"), .true., changes, message)
     call check(message == "", "a friction may change")
@@ -72,7 +73,17 @@ contains
     call compare(with("velocity = 0.0, 0.0", "velocity = 1.0, 0.0"), .true., changes, message)
     call check(changes == "changed     &boundary 'lid' velocity = 1.0, 0.0, 0.0, in the place of 0.0, 0.0, 0.0"//nl, &
       & "a boundary is called by its name: "//changes)
+    call compare_options("c.h5", nameless("1.0")//nameless("1.0"), "a.nml", nameless("1.0")//nameless("2.0"), .true., changes, &
+      & error)
+    call check(changes == "changed     &boundary 'boundary 2' phase = 2.0, in the place of 1.0"//nl, "or by its number: "//changes)
   end subroutine values_that_may_change
+
+  !> A boundary that is called by its number.
+  function nameless(phase) result(group)
+    character(len=*), intent(in) :: phase
+    character(len=:), allocatable :: group
+    group = "&boundary"//nl//"  ! name = 'boundary K', K its number"//nl//"  phase = "//phase//nl//group_end//nl
+  end function nameless
 
   subroutine values_that_may_not()
     character(len=:), allocatable :: changes, message
@@ -85,7 +96,7 @@ contains
     call compare(with(lid, ""), .true., changes, message)
     call check(index(message, "expected &boundary") > 0, "a boundary stays")
     call compare(with(lid, lid//lid), .true., changes, message)
-    call check(index(message, "&boundary: expected "//tables_group) > 0, "no boundary is added")
+    call check(index(message, "&boundary: expected no further group") > 0, "no boundary is added: "//message)
   end subroutine values_that_may_not
 
   subroutine options_on_one_side()
@@ -98,7 +109,9 @@ contains
     call check(changes == "changed     &boundary 'lid' velocity = not given, in the place of 0.0, 0.0, 0.0"//nl, &
       & "an option of then alone: "//changes)
     call compare(with("  radius_min = 1.0"//nl, ""), .true., changes, message)
-    call check(index(message, "(nothing): expected radius_min = 1.0") > 0, "one that may not change: "//message)
+    call check(index(message, "radius_min not given: expected radius_min = 1.0") > 0, "one that may not change: "//message)
+    call compare(with("! wall_friction = the value of `friction`", "wall_friction = 0.1"), .false., changes, message)
+    call check(index(message, "wall_friction = 0.1: expected wall_friction not given") > 0, "one that was not given: "//message)
   end subroutine options_on_one_side
 
   subroutine contents_of_files()
