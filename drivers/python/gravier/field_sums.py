@@ -89,12 +89,15 @@ def contact_sums(run, step, bodies, contacts, grid):
 
 def half_branches(run, step_and_edges, bodies, contacts):
     """Of the contacts of free bodies, a row for each of these: row of the body, row of the contact, way from the centre of the body to the contact (d), and 1 for the candidate, -1 for the antagonist, which
-    feels the opposite force. `bodies`, and the edges of a cell that moves, are those of the middle of the step. The contact of two bodies is half-way between their surfaces, that of a disk or a sphere with a boundary or a glued grain on the surface of this."""
+    feels the opposite force. `bodies`, and the edges of a cell that moves, are those of the middle of the step. The contact of two bodies is half-way between their surfaces, that with a boundary or a glued grain on the surface of this."""
     row, other = run._rows(bodies, contacts)
     free = np.append(bodies.boundary == 0 if "boundary" in bodies else np.ones(len(bodies), dtype=bool), False)
     if "point" in contacts:
         body, contact, way = run._arms(step_and_edges[0], bodies, contacts, step_and_edges[1])
         sign = np.where(np.arange(len(body)) < len(contacts), 1.0, -1.0)
+        # from the middle of the gap on to the surface
+        rest = np.where(free[row] & free[other], 0.0, 0.5) * contacts.gap
+        way = way - (sign * rest[contact])[:, None] * contacts.normal[contact]
     else:
         gap = np.where(free[row] & free[other], 0.5, 1.0) * contacts.gap
         held = other >= 0
