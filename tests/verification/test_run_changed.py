@@ -176,6 +176,15 @@ with gravier.Simulation(case, quiet=True) as s:
         self.assertEqual(history["sleeping"][590], 0)
         self.assertGreater(history["kinetic_translation"][-1], 100 * history["kinetic_translation"][589])
 
+    def test_sleepers_slide(self):
+        """A body that sleeps on a slope slides as soon as friction no longer holds it."""
+        case = merged(RESTING, {"scene": {"wall_material": None, "friction": 0.8, "gravity": [2.0, -9.81], "rotation": False}, "material": [], "law": [],
+                                "time": {"step": 1e-3, "steps": 100}, "solver": {"sleeping": True}, "output": {"checkpoint_every": 100}})
+        run = self.changed_run("slope", case, merged(case, {"scene": {"friction": 0.05}, "time": {"steps": 200}}))
+        self.assertEqual(run.history()["sleeping"][99], 1)
+        speed = (2.0 - 0.05 * 9.81) * 0.1
+        self.assertAlmostEqual(run.history()["kinetic_energy"][-1], 0.5 * 0.1 * speed**2, delta=1e-6)
+
     def assert_refused(self, run, words):
         self.assert_status(run, 2)
         self.assertEqual(run.stderr.count("\n"), 1, run.stderr)
