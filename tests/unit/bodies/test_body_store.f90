@@ -12,6 +12,7 @@ program test_body_store
   integer :: k
 
   call MPI_Init()
+  call test_refit()
   do k = 1, size(kinds, 2)
     call test_records(kinds(:, k))
     call test_reorder(kinds(:, k))
@@ -337,6 +338,37 @@ contains
     record(first) = -1
     call check(layout%invalid_field(record, 0, 0, 0) == "rest", "no body has rested for less than no step")
   end subroutine test_rest
+
+  !> Words of a body that did not turn, fitted to one that turns and may sleep, and back again.
+  subroutine test_refit()
+    type(body_layout_t) :: kept, layout
+    type(body_set_t) :: bodies, others
+    integer(i8), allocatable :: words(:), record(:), again(:)
+
+    kept = body_layout_t(2, 2, 2)
+    layout = body_layout_t(2, 3, 2)
+    layout%nr = 1
+    call bodies%init(kept, 1)
+    bodies%id(1) = 7
+    bodies%radius(1) = 0.5_dp
+    bodies%mass(1) = 2.0_dp
+    bodies%glued(1) = 0
+    bodies%position(:, 1) = [1.0_dp, 2.0_dp]
+    bodies%velocity(:, 1) = [3.0_dp, 4.0_dp]
+    bodies%image(:, 1) = [-5, 6]
+    allocate (words(kept%saved_words()), record(layout%saved_words()), again(kept%saved_words()))
+    call bodies%get_record(1, words)
+    call layout%refit(kept, words, record)
+    call others%init(layout, 1)
+    call others%set_record(1, record)
+    call check(all(abs(others%velocity(:, 1) - [3.0_dp, 4.0_dp, 0.0_dp]) <= 0.0_dp), "it begins without a spin")
+    call check(all(others%image(:, 1) == [-5, 6]) .and. others%rest(1) == 0 .and. .not. others%sleeps(1), &
+      & "what lies behind keeps its words, and it is awake")
+    call check(all(abs(others%position(:, 1) - [1.0_dp, 2.0_dp]) <= 0.0_dp) .and. abs(others%inertia(1)) <= 0.0_dp, &
+      & "it is where it was, and has no inertia yet")
+    call kept%refit(layout, record, again)
+    call check(all(again == words), "the other way round")
+  end subroutine test_refit
 
   !> Names and bytes of the fields add up to the record that travels.
   subroutine test_described(sizes)
