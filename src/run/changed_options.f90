@@ -160,10 +160,10 @@ contains
     call next_line(text, at, title)
     name = line_of(text, "name")
     if (name == nothing) name = line_of(text, "materials")
-    if (title == "&boundary" .and. value_of(name) == value_of(nothing)) then
-      title = title//" 'boundary "//to_text(number)//"'"
-    else if (name /= nothing) then
+    if (is_given(name)) then
       title = title//" "//value_of(name)
+    else if (title == "&boundary") then
+      title = title//" 'boundary "//to_text(number)//"'"
     end if
   end function title_of
 
@@ -189,7 +189,7 @@ contains
     text = trim(adjustl(line))
     if (line == tables_group) then
       text = "no further group"
-    else if (line == nothing .or. index(text, "!") == 1) then
+    else if (.not. is_given(line)) then
       text = key//" not given"
     end if
   end function shown
@@ -213,8 +213,14 @@ contains
     character(len=:), allocatable :: value
 
     value = "not given"
-    if (line /= nothing .and. index(adjustl(line), "!") /= 1) value = text_from(line, index(line, " = ") + 3)
+    if (is_given(line)) value = text_from(line, index(line, " = ") + 3)
   end function value_of
+
+  !> Whether there is such a line, and its value is not one that the program finds.
+  pure logical function is_given(line)
+    character(len=*), intent(in) :: line
+    is_given = line /= nothing .and. index(adjustl(line), "!") /= 1
+  end function is_given
 
   !> The group that begins at a place of a text, and the place behind it; nothing at the end.
   pure subroutine next_group(text, at, group)

@@ -266,9 +266,9 @@ contains
     integer(i8), allocatable :: fitted(:, :)
     integer :: k, before, now
 
+    if (kept%nv == layout%nv .and. kept%nr == layout%nr) return
     before = kept%saved_words()
     now = layout%saved_words()
-    if (before == now) return
     allocate (fitted(now + more, size(records, 2)))
     do k = 1, size(records, 2)
       call layout%refit(kept, records(1:before, k), fitted(1:now, k))

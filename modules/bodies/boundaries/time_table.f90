@@ -267,30 +267,57 @@ contains
     real(dp), intent(in) :: step, theta
     !> [unit of the column times s]
     real(dp), intent(out) :: missed, range
-    real(dp) :: way, exact, begin, low, high, now, before
-    integer :: n, row
+    real(dp) :: way, exact, begin, low, high, until, corner, last
+    integer(i8) :: cycles, turn, n, next
+    integer :: row
 
-    way = 0.0_dp
-    before = self%at(k, 0.0_dp)
-    do n = 1, steps
-      now = self%at(k, n*step)
-      way = way + step*(theta*now + (1.0_dp - theta)*before)
-      before = now
+    until = steps*step
+    ! steps without a row inside follow the table
+    missed = (theta - 0.5_dp)*step*(self%at(k, until) - self%at(k, 0.0_dp))
+    cycles = 0
+    if (self%period > 0.0_dp) cycles = int((until - self%time(1))/self%period, i8)
+    n = -1
+    last = 0.0_dp
+    do turn = 0, max(cycles, 0_i8)
+      do row = 1, size(self%time)
+        corner = self%time(row) + turn*self%period
+        if (corner <= 0.0_dp) cycle
+        if (corner >= until) exit
+        next = int(corner/step, i8)
+        if (next /= n) then
+          if (n >= 0) missed = missed - trapezium(self, k, last, (n + 1)*step)
+          missed = missed + trapezium(self, k, next*step, (next + 1)*step)
+          last = next*step
+          n = next
+        end if
+        missed = missed - trapezium(self, k, last, corner)
+        last = corner
+      end do
     end do
+    if (n >= 0) missed = missed - trapezium(self, k, last, (n + 1)*step)
+    missed = abs(missed)
     begin = integral(self, k, 0.0_dp)
-    exact = integral(self, k, steps*step) - begin
-    missed = abs(way - exact)
+    exact = integral(self, k, until) - begin
     low = min(0.0_dp, exact)
     high = max(0.0_dp, exact)
     way = 0.0_dp
     do row = 1, size(self%time) - 1
-      if (self%time(row) >= steps*step) exit
+      if (self%time(row) >= until) exit
       way = way + 0.5_dp*(self%time(row + 1) - self%time(row))*(self%value(k, row) + self%value(k, row + 1))
       low = min(low, way - begin)
       high = max(high, way - begin)
     end do
     range = high - low
   end subroutine time_table_miss_way
+
+  !> Integral of column `k` between two times, if it is linear between them [unit of the column times s].
+  pure real(dp) function trapezium(self, k, from, to)
+    type(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: from, to
+    trapezium = 0.5_dp*(to - from)*(self%at(k, from) + self%at(k, to))
+  end function trapezium
 
   !> Integral of column `k` from the first row to a time [unit of the column times s].
   pure real(dp) function integral(self, k, time) result(sum_until)

@@ -38,8 +38,9 @@ module gravier_drift
 
   !> ways: of the centre of mass, of the spread, of the cell; those of boundaries come behind them
   integer, parameter :: of_centre = 1, of_spread = 2, of_cell = 3
-  !> terms of the sums over grains: m, m x, m v, m x^2, m v x^T
-  integer, parameter :: in_mass = 1, in_place = 1, in_momentum = 4, in_square = 7, in_product = 10, n_sums = 19
+  !> terms of the sums over grains that are slow: m, m x, m v, m x^2, m v x^T, m v^2; and m of all that are awake
+  integer, parameter :: in_mass = 1, in_place = 1, in_momentum = 4, in_square = 7, in_product = 10, in_energy = 20, in_all = 21, &
+    & n_sums = 21
 
   !> its state, in words: the version of checkpoints, which changes with it
   character(len=*), parameter :: drift_record = "steps slow way"
@@ -81,38 +82,37 @@ contains
     !> of the step
     type(velocity_scale_t), intent(in) :: scale
     type(solve_report_t), intent(in) :: solve
-    real(dp) :: velocity(9), gradient(9), frame(3), most
-    logical :: as_a_whole
+    real(dp) :: velocity(9), spread(9), edge_velocity(9), frame(3), most, slow
+    logical :: all_rest, as_a_whole
     integer :: b
 
     if (solve%status /= solve_converged) return
     most = unresolved_times*solve%velocity_error
-    self%slow = -1.0_dp
-    if (.not. scale%apart < most) then
-      self%slow = slow_motion(decomposition, scale%frame, most)
-      if (.not. (self%slow >= 0.0_dp .and. self%slow < most)) then
-        self%slow = -1.0_dp
-        return
-      end if
-    end if
-    self%steps = self%steps + 1
-    as_a_whole = self%slow < 0.0_dp .and. .not. scale%own < most
+    all_rest = scale%apart < most
+    as_a_whole = all_rest .and. .not. scale%own < most
     frame(:) = scale%frame
     if (as_a_whole) frame(:) = scale%frame + scale%mean
+    slow = -1.0_dp
+    if (mass > 0.0_dp) call find_motion(decomposition, mass, frame, most, velocity, spread, slow)
+    self%slow = -1.0_dp
+    if (.not. all_rest) then
+      if (slow < 0.0_dp .or. .not. slow < most) return
+      self%slow = slow
+    end if
+    self%steps = self%steps + 1
     if (.not. allocated(self%way)) allocate (self%way(9, of_cell + size(decomposition%boundaries)), source=0.0_dp)
     if (mass > 0.0_dp) then
-      call find_motion(decomposition, mass, frame, most, velocity, gradient)
       if (as_a_whole) then
         ! loads of the step have changed the mean velocity
         frame(:) = frame + velocity(1:3)
       else
         call add_way(velocity, physics%h, most, self%way(:, of_centre))
       end if
-      call add_way(gradient, physics%h, most, self%way(:, of_spread))
+      call add_way(spread, physics%h, most, self%way(:, of_spread))
     end if
     if (physics%cell%is_driven) then
-      call find_edge_velocity(decomposition%period%length, physics%cell, gradient)
-      call add_way(gradient, physics%h, most, self%way(:, of_cell))
+      call find_edge_velocity(decomposition%period%length, physics%cell, edge_velocity)
+      call add_way(edge_velocity, physics%h, most, self%way(:, of_cell))
     end if
     velocity(:) = 0.0_dp
     do b = 1, size(decomposition%boundaries)
@@ -126,36 +126,6 @@ contains
     end do
   end subroutine drift_note
 
-  !> Root mean square velocity of the free bodies that are slow, beside that of an observer, where they are most of those that are
-  !> awake; else -1 [m/s]. Collective.
-  real(dp) function slow_motion(decomposition, frame, most) result(motion)
-    type(decomposition_t), intent(in) :: decomposition
-    !> velocity of the observer, and what errors may be [m/s]
-    real(dp), intent(in) :: frame(3), most
-    !> mass of the bodies that are awake, of the slow ones among them, and twice the energy of these
-    real(dp) :: parts(3, size(decomposition%owned)), sums(3), square
-    integer :: s, r, k
-
-    parts(:, :) = 0.0_dp
-    do s = 1, size(parts, 2)
-      associate (bodies => decomposition%owned(s))
-        do r = 1, bodies%awake%n
-          do k = bodies%awake%first(r), bodies%awake%last(r)
-            if (bodies%glued(k) > 0) cycle
-            square = sum((bodies%velocity(1:bodies%nd, k) - frame(1:bodies%nd))**2)
-            parts(1, s) = parts(1, s) + bodies%mass(k)
-            if (square > (in_air*most)**2) cycle
-            parts(2, s) = parts(2, s) + bodies%mass(k)
-            parts(3, s) = parts(3, s) + bodies%mass(k)*square
-          end do
-        end do
-      end associate
-    end do
-    call decomposition%comm%sum_parts(parts, sums)
-    motion = -1.0_dp
-    if (sums(1) > 0.0_dp .and. sums(2) >= most_of_all*sums(1)) motion = sqrt(sums(3)/sums(2))
-  end function slow_motion
-
   !> Add the way of a step at a velocity, of which no more counts than the errors may be.
   pure subroutine add_way(velocity, h, most, way)
     !> (9) [m/s], [s], [m/s]
@@ -168,13 +138,15 @@ contains
     way(:) = way + (h*min(1.0_dp, most/max(speed, most)))*velocity
   end subroutine add_way
 
-  !> Velocity of the centre of mass and of the spread of the free grains, but for those that move freely. Collective.
-  subroutine find_motion(decomposition, mass, frame, most, velocity, spread)
+  !> Velocity of the centre of mass and of the spread of the free grains that are slow. Collective.
+  subroutine find_motion(decomposition, mass, frame, most, velocity, spread, slow)
     type(decomposition_t), intent(in) :: decomposition
     !> of the free grains [kg]; velocity of the observer, and what errors may be [m/s]
     real(dp), intent(in) :: mass, frame(3), most
     !> (9) [m/s]
     real(dp), intent(out) :: velocity(9), spread(9)
+    !> their root mean square velocity, where they are most of those that are awake; else -1 [m/s]
+    real(dp), intent(out) :: slow
     real(dp) :: parts(n_sums, size(decomposition%owned)), sums(n_sums), square
     logical :: open(3)
     integer :: s, d, e, nd
@@ -189,7 +161,9 @@ contains
     call decomposition%comm%sum_parts(parts, sums)
     velocity(:) = 0.0_dp
     spread(:) = 0.0_dp
+    slow = -1.0_dp
     if (.not. sums(in_mass) > 0.0_dp) return
+    if (sums(in_mass) >= most_of_all*sums(in_all)) slow = sqrt(sums(in_energy)/sums(in_mass))
     velocity(1:3) = sums(in_momentum + 1:in_momentum + 3)/mass
     square = 0.0_dp
     do d = 1, nd
@@ -220,10 +194,12 @@ contains
     do r = 1, bodies%awake%n
       do k = bodies%awake%first(r), bodies%awake%last(r)
         if (bodies%glued(k) > 0) cycle
+        part(in_all) = part(in_all) + bodies%mass(k)
         v(:) = bodies%velocity(1:bodies%nd, k) - frame(1:bodies%nd)
         if (norm2(v) > in_air*most) cycle
         associate (m => bodies%mass(k), nd => bodies%nd)
           part(in_mass) = part(in_mass) + m
+          part(in_energy) = part(in_energy) + m*sum(v**2)
           do d = 1, nd
             part(in_momentum + d) = part(in_momentum + d) + m*v(d)
           end do
