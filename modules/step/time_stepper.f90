@@ -366,7 +366,8 @@ contains
     if (self%physics%laws%remembers) call conclude_pairs(self%problem, self%decomposition%boundaries, self%physics%laws, &
       & self%refinement%doubt(figures%uncertain_velocity(self%velocity_scale%bonds), &
       & self%control%accuracy*self%velocity_scale%value), self%velocity_scale%moves(), self%halo%view, doubtful)
-    if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, self%velocity_scale%moves() .or. self%method%keeps_best)
+    if (self%physics%laws%breaks) call self%refinement%note_bonds(doubtful, self%velocity_scale%moves() .or. &
+      & self%method%keeps_best, min(figures%solve%velocity_error, figures%solve%velocity_scale))
     call take_velocities(self%decomposition, self%physics, self%problem)
     call sum_boundary_impulses(self%decomposition, self%problem, self%boundary_impulses)
     call take_boundary_velocities(self%decomposition, self%boundary_impulses)

@@ -32,8 +32,8 @@ module gravier_refinement
   integer, parameter :: iterations_for_bonds = 2500, times_for_bonds = 4
 
   !> words of its state, and what they are, in their order: the version of checkpoints, which changes with them
-  integer, parameter :: refinement_words = 4 + backoff_words
-  character(len=*), parameter :: refinement_record = "turns doublings caution usual "//backoff_record
+  integer, parameter :: refinement_words = 5 + backoff_words
+  character(len=*), parameter :: refinement_record = "turns doublings caution usual before "//backoff_record
 
   type :: refinement_t
     !> since this run began or went on from a checkpoint: solves that aimed at less error, those of them that came to it, and
@@ -57,6 +57,8 @@ module gravier_refinement
     logical, private :: goes_back = .false.
     !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone
     integer, private :: caution = 0, usual = 0
+    !> velocity error of the last step, which the bodies of bonds start the present one with [m/s]
+    real(dp), private :: before = 0.0_dp
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
     procedure :: doubt => refinement_doubt
@@ -71,7 +73,8 @@ module gravier_refinement
 
 contains
 
-  !> The velocity up to which the last solve may be wrong about the bodies of a bond at its limit [m/s].
+  !> The velocity up to which the bodies of a bond at its limit may part by errors [m/s]: of the last solve, and of the one before,
+  !> because an exact solve takes back within one step what the bodies start with in error.
   pure real(dp) function refinement_doubt(self, uncertain, goal) result(doubt)
     class(refinement_t), intent(in) :: self
     !> by the estimate of the solve; the error that the user allows [m/s]
@@ -79,6 +82,7 @@ contains
 
     doubt = uncertain
     if (self%is_fine) doubt = max(uncertain, of_single_bond*share_for_bonds*goal)
+    doubt = max(doubt, self%before)
   end function refinement_doubt
 
   !> Go on with a solve that has reached its goal and leaves bonds at their limits, so that it tells which of them break. The report
@@ -131,14 +135,17 @@ contains
 
   !> After a step, whether some bond was at its limit and the solve did not tell whether it breaks. Ordinary solves have to do where
   !> bodies move by more than errors are compared with, as in impacts, and of methods whose iterations are too dear.
-  pure subroutine refinement_note_bonds(self, doubtful, ordinary)
+  pure subroutine refinement_note_bonds(self, doubtful, ordinary, velocity_error)
     class(refinement_t), intent(inout) :: self
     logical, intent(in) :: doubtful, ordinary
+    !> of the step, at most its velocity scale [m/s]
+    real(dp), intent(in) :: velocity_error
 
     if (doubtful .and. .not. (self%is_fine .or. ordinary)) self%in_doubt = self%in_doubt + 1
     self%caution = max(0, self%caution - 1)
     if (doubtful) call self%take_care()
     if (ordinary) self%caution = 0
+    self%before = velocity_error
   end subroutine refinement_note_bonds
 
   !> Whether the next solve aims at a share of its goal: not where that is hardly smaller, or where too many solves before did not
@@ -240,7 +247,8 @@ contains
     words(2) = self%doublings
     words(3) = self%caution
     words(4) = self%usual
-    call self%backoff%get_state(words(5:))
+    words(5) = transfer(self%before, 0_i8)
+    call self%backoff%get_state(words(6:))
   end subroutine refinement_get_state
 
   pure subroutine refinement_set_state(self, words)
@@ -251,7 +259,8 @@ contains
     self%doublings = narrow(words(2))
     self%caution = narrow(words(3))
     self%usual = narrow(words(4))
-    call self%backoff%set_state(words(5:))
+    self%before = transfer(words(5), 0.0_dp)
+    call self%backoff%set_state(words(6:))
   end subroutine refinement_set_state
 
 end module gravier_refinement
