@@ -537,6 +537,25 @@ class Loads(ComplianceScene):
             self.verify(at, "velocity scale [m/s]", history["velocity_scale"][-1], step * load / MASS / (1.0 + squares), 1e-3 * step * load / MASS)
             self.assertRegex(record.run.stdout, r" m/s: load on springs in \d+ solves")
 
+    def test_load_on_springs_beside_a_slider(self):
+        """What stiff springs hold is right beside a body that is fast, against whose motion other errors are compared: the energy varied by a fifth."""
+        count, load, stiffness = 20, 100.0, 1e8
+        self.step = 1.0 / 1024
+        grains = [Grain([0.0, RADIUS * (2 * k + 1)], radius=RADIUS) for k in range(count)] + [Grain([20.0 * RADIUS, RADIUS], [5.0, 0.0], radius=RADIUS, material=2)]
+        walls = [{"name": "base", "shape": "segment", "point": [-2 * RADIUS, 0.0], "end": [2 * RADIUS, 0.0], "material": "m"},
+                 {"name": "rail", "shape": "segment", "point": [10.0 * RADIUS, 0.0], "end": [30.0, 0.0], "friction": 0.0, "material": "n"},
+                 {"name": "push", "shape": "segment", "point": [-2 * RADIUS, 2 * RADIUS * count], "end": [2 * RADIUS, 2 * RADIUS * count], "material": "m",
+                  "free": [False, True], "mass": 2 * MASS, "force": [0.0, -load]}]
+        record = self.play("springs beside a slider", grains, walls, (0.0, -G), 2000, solver={"criterion": "velocity_error", "tolerance": 1e-2, "check_every": 10,
+                           "warm_start": True}, material=[*MATERIAL, {"name": "n"}],
+                           law=[elastic(normal_stiffness=stiffness, spring_restitution=0.3, tangential_damping=0.5)],
+                           output={"every": 0, "energy": True})
+        history = record.run.history()
+        self.assertGreater(history["velocity_scale"].min(), 0.2)
+        forces = load + MASS * G * np.arange(count + 1)
+        wanted = np.sum(forces**2) / (2 * stiffness)
+        self.verify("load on springs beside a slider", "energy of the springs [J]", history["elastic_energy"][1000:], wanted, 0.06 * wanted)
+
     def test_springs_that_bear_nothing(self):
         """A wall with springs above rigid disks at rest that it does not touch changes nothing, and one that touches a few of them counts among
         all contacts that bear something."""

@@ -483,9 +483,7 @@ contains
       self%kind = "drive"
       if (self%creep > self%drive) self%kind = "creep"
     end if
-    ! beside moving bodies loads count as without springs
     self%quiet = self%value
-    if (self%kind == of_springs) self%quiet = self%load
     if (self%internal .and. .not. self%drive > 0.0_dp) self%quiet = 0.0_dp
     self%share = share_of_own*max(sqrt(1.0_dp - min(self%restitution, 1.0_dp)**2), least_lost)
     if (self%share*self%own > self%value) then
