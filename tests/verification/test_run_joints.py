@@ -53,19 +53,26 @@ class Joints(SmallScene):
 
     def test_attractions(self):
         """At a joint and near it an attraction acts once: a grain that is pulled from the floor holds below its strength, leaves above it, and
-        is not drawn to the joint."""
+        is not drawn to the joint. So it is where meshes meet, or a mesh and a segment."""
+        files = {f"{name}.csv": "x,y\n" + "".join(f"{x},0.0\n" for x in corners) for name, corners in (("left", (-0.3, -0.05, 0.0)), ("right", (0.0, 0.05, 0.3)))}
+        left, right = ({"shape": "mesh", "file": name} for name in files)
+
         def check(dimension):
+            pieces = floor(dimension, (-0.3, 0.0, 0.3))
+            floors = [(pieces, (-0.05, 0.0, 1.2e-8, -1.7e-8, 3e-8, 5e-6, 2e-3))]
+            if dimension == 2:
+                floors += [(walls, (0.0, 1.2e-8, 2e-3)) for walls in ([left, right], [left, pieces[1]], [pieces[0], right])]
             kinds = {"adhesive": {"adhesion": PULL, "adhesion_range": 5e-4}, "bonded": {"bond_strength": PULL, "bond_friction": 1.0, "bond_distance": 1e-4},
                      "capillary": {"capillarity": PULL / RADIUS, "decay_length": 1e-3, "debonding_distance": 5e-4}}
             for kind, keys in kinds.items():
-                for x in (-0.05, 0.0, 1.2e-8, -1.7e-8, 3e-8, 5e-6, 2e-3):
+                for number, (walls, x) in enumerate((walls, x) for walls, places in floors for x in places):
                     for share in (0.95, 1.05):
                         up = share * PULL / MASS * np.eye(dimension)[-1]
-                        record = self.play(f"{kind} {dimension} {x} {share}", [Grain(place(dimension, x, RADIUS), radius=RADIUS, mass=MASS)],
-                                           floor(dimension, (-0.3, 0.0, 0.3)), up, 60, scene={"wall_material": "a"}, material=[{"name": "a"}],
+                        record = self.play(f"{kind} {dimension} {number} {share}", [Grain(place(dimension, x, RADIUS), radius=RADIUS, mass=MASS)], walls, up,
+                                           60, files=files, scene={"wall_material": "a"}, material=[{"name": "a"}],
                                            law=[{"materials": ["a"], "kind": kind, **keys}], output={"every": 60})
                         way = record.position[-1, 0] - record.position[0, 0]
-                        case = f"{kind}, {dimension}D, {x} m from a joint, pulled with {share} of its strength"
+                        case = f"{kind}, {dimension}D, {x} m from a joint of {' and '.join(w['shape'] for w in walls)}, pulled with {share} of its strength"
                         self.assertLess(abs(way[0]), 2e-7, case)
                         if share < 1.0:
                             self.assertLess(way[-1], 1e-8, case)
