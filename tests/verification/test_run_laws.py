@@ -41,8 +41,9 @@ class Rebound(SmallScene):
         return 0.5 * G * (np.sqrt(2.0 / G) + np.mod(golden * np.arange(48), 1.0) / coarsest) ** 2
 
     def test_apex(self):
-        """The n-th apex is e^(2n) h0 but for an error of order 1: the impact is found up to a step late. Where in the step it
-        falls is a matter of chance, so that the error of one ball jumps with h; balls of many heights show the order."""
+        """The n-th apex is e^(2n) h0 but for an error of order 1 at least: the impact is up to half a step early or late. Where in the step it
+        falls is a matter of chance, so that the error of one ball jumps with h; balls of many heights show the order. Early and late impacts
+        balance: where all were late, the mean error was 0.66 to 0.82 steps, times 1/s."""
         restitution, rates = 0.7, np.array([64, 128, 256])
         heights, rms = self.heights(rates[0]), []
         for rate in rates:
@@ -61,26 +62,42 @@ class Rebound(SmallScene):
             # v h, the way in a step at the impact, is what the height of an impact may be off, relative to h0
             self.verify("bouncing ball, e = 0.7", f"apex {n} / h0 at h = 1/{rates[-1]} s, worst of 48 balls",
                         restitution ** (2 * n) + errors[n - 1], restitution ** (2 * n), np.sqrt(2 * G) / rates[-1])
-            self.verify("bouncing ball, e = 0.7", f"order in h of the error of apex {n}", order, 1.0, 0.15)
+            self.assertGreater(order, 0.85)
+            self.assertLess(abs(errors[n - 1].mean()) * rates[-1], 0.4)
 
     def test_rest(self):
-        """At rest after t0 (1 + e) / (1 - e), t0 = sqrt(2 h0 / g), and for good. An impact found the share d of a step late
-        shifts the end by h (1 - d (1 + e) / e): by at most h / e for e <= 1/2."""
+        """At rest after t0 (1 + e) / (1 - e), t0 = sqrt(2 h0 / g), and for good. An impact that is early or late by the share d of a step
+        shifts the end by h (1 - d (1 + e) / e): by at most h / e for e <= 1/2. Shifts have either sign."""
         restitution, rates = 0.5, np.array([64, 128, 256])
-        heights, errors = self.heights(rates[0]), []
+        heights = self.heights(rates[0])
         for rate in rates:
             record = self.drops(rate, restitution, 2.0, heights)
             moves = np.abs(record.velocity[:, :, 1]) > 1e-9
             last = len(moves) - 1 - np.argmax(moves[::-1], axis=0)
             wanted = np.sqrt(2 * heights / G) * (1 + restitution) / (1 - restitution)
-            errors.append(np.sqrt(np.mean((record.time[last] - wanted) ** 2)))
             # bounces that are seen until the speed is g h, and two more until it is 0
             bounces = np.log(np.sqrt(2 / G) * rate) / np.log(1 / restitution) + 2
             self.verify("bouncing ball, e = 0.5", f"time until rest [s] at h = 1/{rate} s, worst of 48 balls", record.time[last],
                         wanted, bounces / restitution / rate)
-        # h log(1/h): a little less than 1
-        self.verify("bouncing ball, e = 0.5", "order in h of the error of the time until rest",
-                    -np.polyfit(np.log(rates), np.log(errors), 1)[0], 1.0, 0.3)
+
+    def test_pressure_of_a_gas(self):
+        """Elastic disks whose impacts make the pressure of a gas, 2 phi X(phi) n T beside that of their motion, with the pair correlation at touch
+        X = (1 - 7/16 phi)/(1 - phi)^2 (Henderson 1975). A disk goes 3.5 % of its diameter in a step. Where all impacts were late by half a step in
+        the mean, as if the disks were smaller, the pressure was 13 % too low."""
+        count, radius, share, step = 16, 0.01, 0.5, 5e-4
+        edge = count * radius * np.sqrt(np.pi / share)
+        draws = np.random.default_rng(3)
+        velocity = draws.normal(0.0, 1.0, (count**2, 2))
+        velocity -= velocity.mean(axis=0)
+        disks = [Grain(((k % count + 0.5) * edge / count, (k // count + 0.5) * edge / count), v, radius=radius) for k, v in enumerate(velocity)]
+        record = self.play("gas", disks, steps=4000, time={"step": step}, scene={"restitution": 1.0, "period": [edge, edge]},
+                           output={"every": 0, "energy": True, "stress": True})
+        history = record.run.history()
+        self.assertGreater(history["kinetic_energy"][-1], 0.99 * history["kinetic_energy"][0])
+        late = slice(1000, None)
+        # energy of the disks over the area is n T in two dimensions
+        impacts = 2.0 * share * (1.0 - 7.0 / 16.0 * share) / (1.0 - share) ** 2 * history["kinetic_energy"][late].mean() / edge**2
+        self.verify("gas of 256 disks", "pressure of impacts [N/m]", history["pressure"][late].mean(), impacts, 0.05 * impacts)
 
     def test_gap(self):
         """Without rebound, the step that would close the gap takes its whole way up, no more: v = -gap / h. With rebound the

@@ -11,7 +11,7 @@ module gravier_contact_packing
   use gravier_cell_response, only: image_velocity
   use gravier_halo, only: local_bodies_t
   use gravier_surface_velocity, only: contact_place_t, add_travel
-  use gravier_pair_laws, only: law_of, terms_of
+  use gravier_pair_laws, only: law_of, terms_of, sends_back
   use gravier_contact_springs, only: pack_spring
   use gravier_bond_turning, only: find_bond_velocity
   use gravier_bonded_groups, only: bonded_groups_t, find_bonded_groups
@@ -347,7 +347,7 @@ contains
           image(:) = image_velocity(sub, nd, c, physics%cell%before)
           v(q, 1:kernels%nf, g) = v(q, 1:kernels%nf, g) - image(1:kernels%nf)
         end if
-        if (terms%restitution > 0.0_dp) then
+        if (sends_back(terms)) then
           if (physics%cell%moves) free(q, 1, g) = free(q, 1, g) + cell_adds(found, physics, this, sub)
           sub%hot(q, row%shift, g) = terms%restitution*v(q, 1, g)
           if (v(q, 1, g) > 0.0_dp .and. free(q, 1, g) < 0.0_dp) sub%hot(q, row%shift, g) = 0.0_dp

@@ -9,10 +9,10 @@ module gravier_narrow_phase
   use gravier_halo, only: local_bodies_t
   use gravier_wall_joints, only: joints_t, has_other
   use gravier_screens, only: screens_t
-  use gravier_surface_velocity, only: contact_place_t, round_place
+  use gravier_surface_velocity, only: contact_place_t, round_place, round_normal_velocity
   use gravier_pair_points, only: pair_points_t, carry_memory
   use gravier_shape_contacts, only: shape_work_t, find_points
-  use gravier_pair_laws, only: boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair
+  use gravier_pair_laws, only: boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair, sends_back
   use gravier_physics, only: physics_t
   implicit none
   private
@@ -43,8 +43,8 @@ module gravier_narrow_phase
 
 contains
 
-  !> Narrow phase: gaps and normals of the near pairs that are looked at, of which those within the alert distance are contacts. A
-  !> law with restitution acts from the moment of touching on (Moreau 1988), so that its contacts have no positive gap.
+  !> Narrow phase: gaps and normals of the near pairs that are looked at, of which those within the alert distance are contacts.
+  !> Those that are open under a law with restitution are none if their bodies do not come to touch within half a step.
   subroutine find_contacts(view, decomposition, physics, found)
     type(local_bodies_t), intent(inout) :: view
     type(decomposition_t), intent(in) :: decomposition
@@ -283,7 +283,8 @@ contains
       associate (p => found%source(found%n + 1), gap => found%gap(found%n + 1))
         ! where some law has restitution; the law of a contact that is closed is looked up where its terms are packed
         if (physics%laws%returns .and. gap > 0.0_dp) then
-          if (is_closed_under(terms_of(physics%laws, law_of(view, decomposition%boundaries, physics%laws, p), gap))) return
+          if (is_idle(view, decomposition, physics, found, terms_of(physics%laws, law_of(view, decomposition%boundaries, &
+            & physics%laws, p), gap))) return
         end if
       end associate
       call keep_contact(view, found)
@@ -318,7 +319,9 @@ contains
       pair%terms = terms_of(physics%laws, l, gap)
     end if
     if (is_far(view%list, p, gap, decomposition%alert_distance())) return
-    if (gap > 0.0_dp .and. is_closed_under(pair%terms)) return
+    if (gap > 0.0_dp) then
+      if (is_idle(view, decomposition, physics, found, pair%terms)) return
+    end if
     call keep_contact(view, found)
     if (is_stretched(physics%laws%of(l)%law, pair, decomposition%alert_distance())) &
       & found%stretched_bonds = found%stretched_bonds + 1
@@ -337,12 +340,29 @@ contains
     is_stretched = law%breaks .and. pair%state /= 0 .and. pair%gap > max(law%range, 0.5_dp*alert)
   end function is_stretched
 
-  !> Whether what is open is no contact under these terms: what has restitution acts from the moment of touching on.
-  pure logical function is_closed_under(terms)
+  !> Whether an open contact, written behind the last one of the list, does nothing in this step under its terms. Restitution acts
+  !> at the moment of touching (Moreau 1988). A step has the impacts of the half step before its middle, whose contacts are closed,
+  !> and those of the half step behind it, so that impacts are early as often as late.
+  pure logical function is_idle(view, decomposition, physics, found, terms)
+    type(local_bodies_t), intent(in) :: view
+    type(decomposition_t), intent(in) :: decomposition
+    type(physics_t), intent(in) :: physics
+    type(contact_list_t), intent(in) :: found
     type(contact_terms_t), intent(in) :: terms
+    type(contact_pair_t) :: pair
 
-    is_closed_under = terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp
-  end function is_closed_under
+    is_idle = sends_back(terms)
+    if (.not. is_idle) return
+    associate (c => found%n + 1)
+      if (decomposition%no == 0) then
+        pair%normal_velocity = round_normal_velocity(view, decomposition%boundaries, found%source(c), found%normal(:, c))
+      else
+        call find_pair_velocity(view, decomposition%boundaries, found%source(c), place_of(view, found, c, joined=.false.), &
+          & found%normal(:, c), pair)
+      end if
+      is_idle = found%gap(c) + 0.5_dp*physics%h*pair%normal_velocity > 0.0_dp
+    end associate
+  end function is_idle
 
   !> Take the contact that was written behind the last one into the list.
   pure subroutine keep_contact(view, found)

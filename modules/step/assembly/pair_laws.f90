@@ -14,7 +14,7 @@ module gravier_pair_laws
   implicit none
   private
   public :: set_default_laws, boundary_of, law_of, terms_of, find_pair_velocity, evaluate_pair, conclude_pairs, &
-    & bonds_at_limit
+    & bonds_at_limit, sends_back
 
 contains
 
@@ -73,6 +73,13 @@ contains
     if (allocated(laws%of)) terms = laws%of(l)%terms
     terms%free_gap = max(gap, 0.0_dp)
   end function terms_of
+
+  !> Whether a contact under these terms sends bodies back.
+  pure logical function sends_back(terms)
+    type(contact_terms_t), intent(in) :: terms
+
+    sends_back = terms%restitution > 0.0_dp .or. terms%tangential_restitution > 0.0_dp
+  end function sends_back
 
   !> Relative velocity of pair `p` at the start of a step, for laws that see it.
   pure subroutine find_pair_velocity(view, boundaries, p, place, normal, pair)

@@ -10,7 +10,7 @@ module gravier_surface_velocity
   implicit none
   private
   public :: contact_place_t, round_place, find_start_velocity, find_surface_velocity, find_wall_point, &
-    & add_image_velocity, boundary_that_has, add_travel
+    & add_image_velocity, boundary_that_has, add_travel, round_normal_velocity
 
   !> part of a velocity that counts as its rounding
   real(dp), parameter :: rounded = 1.0e-12_dp
@@ -70,6 +70,24 @@ contains
       call boundaries(b)%last_velocity_at(point, v(1:size(point)))
     end if
   end subroutine find_start_velocity
+
+  !> Velocity along the normal of the disks or spheres of pair `p`, or of one and a boundary, at the start of a step [m/s]. Spins of
+  !> free grains have no part in it, nor does it matter where along the normal a boundary is touched.
+  pure real(dp) function round_normal_velocity(view, boundaries, p, normal) result(velocity)
+    type(local_bodies_t), intent(in) :: view
+    type(boundary_t), intent(in) :: boundaries(:)
+    integer, intent(in) :: p
+    !> (nd) from the antagonist to the candidate
+    real(dp), intent(in) :: normal(:)
+    real(dp) :: v(size(normal)), w(size(normal))
+    integer :: i, j
+
+    call view%find_ends(p, i, j)
+    call find_start_velocity(view, boundaries, i, view%bodies%position(:, i), v)
+    call find_start_velocity(view, boundaries, j, view%bodies%position(:, merge(j, i, j > 0)), w)
+    if (j > 0) call add_image_velocity(view, p, w)
+    velocity = sum((v - w)*normal)
+  end function round_normal_velocity
 
   !> Add to the velocity of a turning boundary at a contact what it changes by while the contact travels as the centre of the body
   !> does: with the boundary along the normal, with the body across it. A body goes on from one place of contact to that of the next

@@ -158,7 +158,8 @@ contains
     call check_close(found%normal(1, 1), 1.0_dp, rounding, "its normal points from the image to the candidate")
   end subroutine check_periods
 
-  !> A law with restitution acts from touching on, whatever the alert distance; boundaries have values of their own.
+  !> A law with restitution acts in the step in which bodies touch, whatever the alert distance; boundaries have values of their
+  !> own.
   subroutine check_restitution()
     type(local_bodies_t) :: view
     type(decomposition_t) :: decomposition
@@ -175,6 +176,14 @@ contains
     call physics%laws%set_default(1, coefficients_t(friction=0.1_dp, tangential_restitution=0.7_dp))
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 0, "with friction the boundary's is")
+    physics%h = 0.1_dp
+    view%bodies%velocity(1, 2) = -0.09_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 0, "a pair that comes together by nine tenths of its gap in half a step is no contact")
+    view%bodies%velocity(1, 2) = -0.11_dp
+    call find_contacts(view, decomposition, physics, found)
+    call check_equal(found%n, 1, "a pair that touches within half a step is one")
+    view%bodies%velocity(1, 2) = 0.0_dp
     view%bodies%position(1, 2) = 0.2_dp*(1.0_dp - epsilon(1.0_dp))
     call find_contacts(view, decomposition, physics, found)
     call check_equal(found%n, 1, "a pair that touches is a contact")
