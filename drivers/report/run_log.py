@@ -17,13 +17,18 @@ class RunLog:
 
     def __init__(self, text):
         starts = starts_of(text)
-        self.restarts, self.lines = len(starts) - 1, starts[-1]
+        self.restarts, self.lines, self._starts = len(starts) - 1, starts[-1], starts
         #: what the log says of convergence over all starts
         self.convergence = convergence(text)
 
     def value(self, word):
         """What follows the last line that begins with a word; empty where there is none."""
         return said_of(self.lines, word)
+
+    def largest(self, word, pattern):
+        """The largest of the numbers that a pattern finds in the last lines of all starts that begin with a word; 0 where there are none. history.csv may
+        not have the step of such a number among its rows."""
+        return max((float(found) for lines in self._starts for found in re.findall(pattern, said_of(lines, word))), default=0.0)
 
     def version(self):
         """The program and the libraries, a line each."""

@@ -414,7 +414,7 @@ contains
 
     free_grains = real(max(self%n_grains - self%n_glued, 1_i8), dp)
     call self%tally%add_step(figures%max_overlap, figures%interface_statistics, shifts/self%overlap_allowed > rounded_shift, &
-      & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains)
+      & shifts/free_grains, self%physics%h*self%balance%speeds/free_grains, figures%deep%number)
     call self%drift%note(self%decomposition, self%physics, self%boundary_impulses, self%mass, self%velocity_scale, figures%solve)
     self%step = self%step + 1
     self%time = self%step*self%physics%h

@@ -232,6 +232,8 @@ contains
       end if
       if (tally%later_overlap > deep*simulation%mean_half_thickness .and. simulation%mean_half_thickness > 0.0_dp) text = text// &
         & "; overlaps came to "//plain(tally%later_overlap/simulation%mean_half_thickness)//" of "//mean_size_name(simulation)
+      if (tally%pressed_deep > 0) text = text//"; in "//counted(tally%pressed_deep, "step")// &
+        & " bodies were pressed into each other by a quarter of a thickness and more, and may have come out on the other side"
       if (drifts(simulation)) text = text//"; in "//to_text(simulation%drift%steps)//" of the "// &
         & counted(int(simulation%step, i8), "step")// &
         & " bodies moved by no more than the errors of solves, and came "// &

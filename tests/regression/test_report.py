@@ -187,6 +187,26 @@ class Report(RunTestCase):
         (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J; the sizes of its terms sum up to 1.0 J\n"))
         self.assertIn("since the last restart", answer.text)
 
+    def test_rows_that_are_left_out(self):
+        """The largest overlap and velocity error are those of the run, of all starts, where history.csv has other steps: the log has them."""
+        history = gravier.results.Table(step=np.array([100]), max_overlap=np.array([1e-4]), projected=np.zeros(1), velocity_error=np.array([1e-3]),
+                                        velocity_scale=np.array([1e-1]), converged=np.ones(1))
+        start = "Gravier 0.1.0 (a), dense\naccuracy    velocity error at most {} of U at the end of a solve, accuracy 1.00E-01; residual at most 1E-2\n" \
+                "overlaps    in the first step at most {} m, later at most {} m, 7.0E-02 of the mean radius\n"
+        by_residual = {"criterion": "residual"}
+        for starts, solver, error, overlap, grade in (
+                ([("9.0E-03", "0.0E+00", "7.14E-05")], {}, "0.01", "0.0001", "good"),
+                ([("9.00E-02", "3.0E-05", "7.14E-04")], {}, "0.09", "0.00071", "good"),
+                ([("1.68E+00", "3.0E-03", "7.14E-04")], {}, "1.7", "0.003", "doubt"),
+                ([("5.0E-02", "0.0E+00", "9.00E-03"), ("9.0E-02", "0.0E+00", "7.14E-04")], {}, "0.09", "0.009", "good"),
+                ([("9.0E-02", "0.0E+00", "0.0E+00")], by_residual, "0.09", "0.0001", "good"),
+                ([("1.68E+00", "0.0E+00", "0.0E+00")], by_residual, "1.7", "0.0001", "bad")):
+            log = RunLog("".join(start.format(*values) for values in starts))
+            said = verdict.accurate(log, history, [(0, solver)])
+            self.assertIn(f"the velocity error was at most {error} of U", said.text)
+            self.assertEqual(said.grade, grade, starts)
+            self.assertIn(f"The largest overlap was {overlap} m", verdict.projected(log, history).text)
+
     def test_projected(self):
         """Projections are judged as the last words judge them, by how often and how far they shift grains; those before a restart count."""
         def history(steps, projected):

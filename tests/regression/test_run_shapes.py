@@ -341,7 +341,8 @@ class Shapes(RunTestCase):
                 self.assertEqual(fast in check.stdout, fast in words)
 
     def test_soft_balls(self):
-        """A disk that a soft spring lets through a segment, or through another disk, is warned of; a plane stops it, and no harder spring lets it in."""
+        """A disk that a soft spring lets through a segment, or through another disk, is warned of, and its run is in doubt; a plane stops it, and no harder
+        spring lets it in."""
         soft = {"scene": {"gravity": [0.0, 0.0]}, "material": [{"name": "m"}],
                 "law": [{"materials": "m", "kind": "elastic", "normal_stiffness": 1e3}], "time": {"step": 1e-4, "steps": 400}, "output": {"every": 0}}
         ground = {"segment": {"shape": "segment", "point": [1.0, 0.0], "end": [-1.0, 0.0]}, "plane": {"shape": "plane", "normal": [0.0, 1.0]}}
@@ -356,6 +357,10 @@ class Shapes(RunTestCase):
             run = run_case(case, 1, directory)
             self.assert_status(run, 0)
             self.assertEqual(words in run.stdout, told, name)
+            results = package.Run(run.path("results"))
+            self.assertEqual(results.verdict(), "converged with doubts" if told else "converged", name)
+            self.assertEqual("bodies were pressed into each other by a quarter of a thickness and more, and may have come out on the other side"
+                             in results.doubts(), told, name)
 
     def test_pressure_across_a_period(self):
         """Three bricks stacked across the side of a period have the pressures and the chains that they have in its middle. Each contact has

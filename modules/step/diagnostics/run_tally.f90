@@ -55,6 +55,8 @@ module gravier_run_tally
     integer(i8) :: steps_left_out = 0, most_left_out = 0
     !> steps in which intact bonds were stretched, and the most of them in one
     integer(i8) :: steps_stretched = 0, most_stretched = 0
+    !> steps in which contacts were pressed so deep that bodies may come out on the other side of each other
+    integer(i8) :: pressed_deep = 0
     !> contacts that were left out because they sleep, and solves that were made anew because bodies woke
     integer(i8) :: slept = 0, woken = 0
     !> of the solve that stagnated with most contacts that creep, and the largest change over the velocity scale of all such solves
@@ -140,7 +142,7 @@ contains
   end subroutine add_kind
 
   !> Add what moved in a step.
-  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path)
+  pure subroutine run_tally_add_step(self, overlap, statistics, mended, shift, path, n_deep)
     class(run_tally_t), intent(inout) :: self
     !> largest one at the middle of the step [m]
     real(dp), intent(in) :: overlap
@@ -150,6 +152,8 @@ contains
     logical, intent(in) :: mended
     !> means over the free grains [m]
     real(dp), intent(in) :: shift, path
+    !> contacts that are pressed deep
+    integer(i8), intent(in) :: n_deep
 
     self%steps = self%steps + 1
     if (self%steps == 1) then
@@ -158,6 +162,7 @@ contains
       self%later_overlap = max(self%later_overlap, overlap)
     end if
     if (mended) self%projected = self%projected + 1
+    if (n_deep > 0) self%pressed_deep = self%pressed_deep + 1
     if (statistics%overlapping_cores > 0) self%steps_with_cores = self%steps_with_cores + 1
     self%most_cores = max(self%most_cores, statistics%overlapping_cores)
     if (statistics%points_left_out > 0) self%steps_left_out = self%steps_left_out + 1

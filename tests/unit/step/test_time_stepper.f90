@@ -2,7 +2,7 @@
 !> when space is divided, the contact in which a solve failed, the tally of a run.
 program test_time_stepper
   use, intrinsic :: ieee_arithmetic, only: ieee_value, ieee_quiet_nan
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
   use gravier_communicator, only: communicator_t, start_parallel, stop_parallel
   use gravier_time_table, only: time_table_t
@@ -275,9 +275,10 @@ contains
     call check_close(tally%most_scale, 0.4_dp, 0.0_dp, "largest scale")
     call check_equal(tally%n_kinds, 2, "kinds of scales")
     call check_equal(int(tally%of_kind(1)), 5, "solves of the first kind")
-    call tally%add_step(0.3_dp, interface_statistics_t(), .true., 0.1_dp, 1.0_dp)
-    call tally%add_step(0.1_dp, interface_statistics_t(overlapping_cores=4, stretched_bonds=2), .false., 0.0_dp, 2.0_dp)
-    call tally%add_step(0.5_dp, interface_statistics_t(overlapping_cores=3, points_left_out=7), .false., 0.2_dp, 3.0_dp)
+    call tally%add_step(0.3_dp, interface_statistics_t(), .true., 0.1_dp, 1.0_dp, 0_i8)
+    call tally%add_step(0.1_dp, interface_statistics_t(overlapping_cores=4, stretched_bonds=2), .false., 0.0_dp, 2.0_dp, 3_i8)
+    call tally%add_step(0.5_dp, interface_statistics_t(overlapping_cores=3, points_left_out=7), .false., 0.2_dp, 3.0_dp, 1_i8)
+    call check_equal(int(tally%pressed_deep), 2, "steps with contacts that are pressed deep")
     call check_equal(int(tally%steps_left_out), 1, "steps in which points were left out")
     call check_equal(int(tally%most_left_out), 7, "the most points in one of them")
     call check_equal(int(tally%steps_with_cores), 2, "steps in which cores overlapped")
