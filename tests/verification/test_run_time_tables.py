@@ -72,6 +72,15 @@ class TimeTables(SmallScene):
         angle = table.ways("omega", STEP, 2060)[::10]
         self.verify("angle by a table", "angle [rad]", np.arctan2(-normal[:, 0], normal[:, 1]), angle, 1e-11)
 
+    def test_work(self):
+        """A plane that a table begins to turn pushes a disk far from its pivot: it does the work that the disk has as energy, and nothing is dissipated."""
+        table = TimeTable([0.0, 0.0105, 0.0106], {"omega": [0.0, 0.0, 0.2]})
+        record = self.play("work", [Grain([0.0, 0.05], radius=0.05, mass=MASS)], [plane([0.0, 0.0], [0.0, 1.0], pivot=[-10.0, 0.0], table="drive.csv")], steps=12,
+                           files={"drive.csv": table.text}, output={"energy": True})
+        history, energy = record.run.history(), 0.5 * MASS * 2.0**2
+        self.verify("work of a boundary that a table turns", "work of the boundary [J]", history["boundary_work"][-1], energy, 1e-3 * energy)
+        self.verify("work of a boundary that a table turns", "dissipated energy [J]", history["dissipated_normal"][-1], 0.0, 1e-6 * energy)
+
     def test_forces(self):
         """A free boundary has the momentum of the integral of its force, whatever pulses lie within steps."""
         for title, times, forces, repeats, steps in (("square wave", SQUARE, wave(10.0), True, 5000), ("pulses", PULSE, [0.0, 0.0, 700.0, -10.0, 0.0], True, 1000),
