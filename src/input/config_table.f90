@@ -191,7 +191,7 @@ module gravier_config_table
            unit="kg", note="required where a component is `free`", chooser="shape", chosen=solid_shapes), &
      key_t("boundary", "table", kind_text, "''", "", &
            "path of a CSV file with a column `time` and any of `vx,vy,vz`, `omega` (2D) or `wx,wy,wz` (3D), `fx,fy,fz`, "// &
-           "`pressure`, which replace the constants: linear in time, constant outside"), &
+           "`pressure`, each in the place of a constant, which is then 0: linear in time, constant outside"), &
      key_t("boundary", "table_repeats", kind_logical, ".false.", "", &
            "the table begins anew after its last row, which is as the first"), &
      key_t("boundary", "friction", kind_real, "-1", ">= 0", "friction coefficient between grains and this boundary", &

@@ -4,6 +4,7 @@ module gravier_scale_report
   use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
   use gravier_time_table, only: time_table_t
+  use gravier_boundary_drive, only: drive_rates
   use gravier_cell_drive, only: cell_components
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
@@ -37,8 +38,6 @@ module gravier_scale_report
   real(dp), parameter :: most_of_period = 0.1_dp
   !> part of the ups and downs of a table that steps should keep
   real(dp), parameter :: least_kept = 0.9_dp
-  !> part of the range of a way by which jumps of a table may lead it astray
-  real(dp), parameter :: most_missed = 0.02_dp
   !> answer times of a cell between two turns of a stress that it holds: measured, where a shear to and fro has the strain of a
   !> light cell to a tenth
   real(dp), parameter :: least_answers = 15.0_dp
@@ -141,7 +140,6 @@ contains
       if (simulation%tally%stiffest > most_by_spring) call warn(spring_warning(simulation))
       call warn(cell_warning(simulation, d))
       call warn(table_warning(simulation))
-      call warn(way_warning(simulation))
       call warn(oscillation_warning(simulation))
       a = scales%relative_step(h)
       if (a > most_relative_step) call warn_step("h sqrt(P/rho)/d = "//figure(a)//" under the pressure on '"// &
@@ -294,23 +292,28 @@ contains
 
     text = ""
     least = least_kept
-    call look(simulation%gravity_table, "&scene gravity_table = '"//trim(simulation%config%scene%gravity_table)//"'")
-    call look(simulation%cell_drive%table, "&scene cell_table = '"//trim(simulation%config%scene%cell_table)//"'")
-    do b = 1, size(simulation%decomposition%boundaries)
-      associate (boundary => simulation%decomposition%boundaries(b))
-        call look(boundary%drive%table, "boundary '"//boundary%name//"': its table")
-      end associate
-    end do
+    associate (nd => simulation%decomposition%nd)
+      call look(simulation%gravity_table, 0, "&scene gravity_table = '"//trim(simulation%config%scene%gravity_table)//"'")
+      call look(simulation%cell_drive%table, cell_components(nd), "&scene cell_table = '"// &
+        & trim(simulation%config%scene%cell_table)//"'")
+      do b = 1, size(simulation%decomposition%boundaries)
+        associate (boundary => simulation%decomposition%boundaries(b))
+          call look(boundary%drive%table, drive_rates(nd), "boundary '"//boundary%name//"': its table")
+        end associate
+      end do
+    end associate
 
   contains
 
-    subroutine look(table, name)
+    subroutine look(table, n_rates, name)
       type(time_table_t), intent(in) :: table
+      !> columns of velocities, spins or rates, which come first
+      integer, intent(in) :: n_rates
       character(len=*), intent(in) :: name
       real(dp) :: kept
 
       if (.not. allocated(table%has)) return
-      kept = table%kept_variation(simulation%config%time%step, simulation%config%time%steps)
+      kept = table%kept_variation(n_rates, simulation%config%time%step, simulation%config%time%steps)
       if (.not. kept < least) return
       least = kept
       text = name//" turns within steps: they keep "//to_text(nint(100.0_dp*kept))// &
@@ -318,49 +321,6 @@ contains
     end subroutine look
 
   end function table_warning
-
-  !> That the jumps of a table lead a boundary or the cell astray, the one that misses most of its way; else empty.
-  function way_warning(simulation) result(text)
-    type(simulation_t), intent(in) :: simulation
-    character(len=:), allocatable :: text
-    real(dp) :: most
-    integer :: b, nd
-
-    text = ""
-    most = most_missed
-    nd = simulation%decomposition%nd
-    if (allocated(simulation%cell_drive%table%has)) call look(simulation%cell_drive%table, &
-      & size(simulation%cell_drive%table%has)/2, "&scene cell_table = '"//trim(simulation%config%scene%cell_table)//"'")
-    do b = 1, size(simulation%decomposition%boundaries)
-      associate (boundary => simulation%decomposition%boundaries(b))
-        call look(boundary%drive%table, 3*nd - 3, "boundary '"//boundary%name//"': its table")
-      end associate
-    end do
-
-  contains
-
-    subroutine look(table, n_rates, name)
-      type(time_table_t), intent(in) :: table
-      !> columns that are velocities, spins or rates, which come first
-      integer, intent(in) :: n_rates
-      character(len=*), intent(in) :: name
-      real(dp) :: missed, range
-      integer :: k
-
-      if (.not. allocated(table%has)) return
-      associate (time => simulation%config%time)
-        do k = 1, n_rates
-          if (.not. table%has(k)) cycle
-          call table%miss_way(k, time%step, time%theta, time%steps, missed, range)
-          if (.not. missed > most*range) cycle
-          most = missed/max(range, missed)
-          text = name//" jumps within steps: the way or strain that they make is off by "//figure(missed)//" at the end, "// &
-            & to_text(nint(100.0_dp*most))//" % of its range; a smaller &time step, or rows at the times of steps, follow it"
-        end do
-      end associate
-    end subroutine look
-
-  end function way_warning
 
   !> That steps do not follow an oscillation, the fastest one; else empty.
   function oscillation_warning(simulation) result(text)

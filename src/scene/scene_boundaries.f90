@@ -70,8 +70,10 @@ contains
     do b = 1, size(boundaries)
       boundaries(b)%faces = faces_along(boundaries(b))
       if (allocated(error)) exit
-      call boundaries(b)%prescribe(nd, 0.0_dp)
-      if (b > data%n_walls) call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
+      call boundaries(b)%prescribe(nd, 0.0_dp, config%time%step)
+      if (b <= data%n_walls) cycle
+      call check_table(boundaries(b), nd, trim(config%boundaries(b - data%n_walls)%table), error)
+      call check_constants(boundaries(b), nd, config%file, trim(config%boundaries(b - data%n_walls)%table), error)
     end do
   end subroutine make_boundaries
 
@@ -279,6 +281,41 @@ contains
     end subroutine refuse
 
   end subroutine check_table
+
+  !> Refuse a constant that would do nothing, since the table has a column for it. Along other axes constants stay in force.
+  subroutine check_constants(boundary, nd, file, path, error)
+    type(boundary_t), intent(in) :: boundary
+    integer, intent(in) :: nd
+    !> of the case, and of the table
+    character(len=*), intent(in) :: file, path
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=1), parameter :: axes(3) = ["x", "y", "z"]
+    integer :: k
+
+    associate (drive => boundary%drive)
+      do k = 1, 3
+        call look(drives_velocity, drive%velocity(k), "velocity", " along "//axes(k), "v"//axes(k))
+        if (nd == 2) call look(drives_spin, drive%spin(k), "rotation", "", "omega")
+        if (nd == 3) call look(drives_spin, drive%spin(k), "rotation", " about "//axes(k), "w"//axes(k))
+        call look(drives_force, drive%force(k), "force", " along "//axes(k), "f"//axes(k))
+      end do
+      k = 1
+      call look(drives_pressure, drive%pressure, "pressure", "", "pressure")
+    end associate
+
+  contains
+
+    subroutine look(quantity, constant, key, axis, column)
+      integer, intent(in) :: quantity
+      real(dp), intent(in) :: constant
+      character(len=*), intent(in) :: key, axis, column
+
+      if (allocated(error) .or. .not. abs(constant) > 0.0_dp) return
+      if (boundary%drive%gives(quantity, k)) call raise(error, status_input, file//": &boundary '"//boundary%name//"' "//key// &
+        & ": "//to_text(constant, 4)//axis//": expected 0, since the column "//column//" of "//path//" replaces it")
+    end subroutine look
+
+  end subroutine check_constants
 
   !> Refuse a pressure whose area is not known.
   subroutine check_pressures(file, nd, period, boundaries, error)

@@ -14,6 +14,8 @@ module gravier_scene_scales
 
   !> least component along an axis of the normal of a plane that faces along it, and of one that carries grains
   real(dp), parameter :: carrying = 0.1_dp
+  !> steps between two rows of a table from which on both are looked at
+  real(dp), parameter :: close_rows = 0.125_dp
   real(dp), parameter :: pi = acos(-1.0_dp)
   !> fraction of space that grains fill in a square or cubic lattice: a looser scene has room to fall into
   real(dp), parameter :: loosest(2:3) = [pi/4.0_dp, pi/6.0_dp]
@@ -144,55 +146,68 @@ contains
     end do
   end subroutine find_extent
 
-  !> Begin and end of the run, and the rows of all tables between them: what is linear in time is largest at one of these. Of an
-  !> oscillation its first two extremes, in either direction.
+  !> Ends of steps at which something that tables give may be largest: those of the first and the last step, and those beside the
+  !> rows, since means over a step are largest where it has a row in the middle or at an end. Of an oscillation its first two
+  !> extremes, in either direction.
   subroutine find_times(simulation, times)
     type(simulation_t), intent(in) :: simulation
     !> in no order [s]
     real(dp), allocatable, intent(out) :: times(:)
+    real(dp), allocatable :: found(:)
     real(dp) :: end_time, extreme(2)
     integer :: b, n, room
 
     end_time = simulation%config%time%steps*simulation%config%time%step
     room = 2
-    if (allocated(simulation%gravity_table%time)) room = room + size(simulation%gravity_table%time)
-    if (allocated(simulation%cell_drive%table%time)) room = room + size(simulation%cell_drive%table%time)
+    if (allocated(simulation%gravity_table%time)) room = room + 4*size(simulation%gravity_table%time)
+    if (allocated(simulation%cell_drive%table%time)) room = room + 4*size(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
       associate (table => simulation%decomposition%boundaries(b)%drive%table)
-        if (allocated(table%time)) room = room + size(table%time)
+        if (allocated(table%time)) room = room + 4*size(table%time)
       end associate
       if (simulation%decomposition%boundaries(b)%drive%oscillates()) room = room + 2
     end do
-    allocate (times(room), source=0.0_dp)
-    times(2) = end_time
+    allocate (found(room))
+    found(1) = min(simulation%config%time%step, end_time)
+    found(2) = end_time
     n = 2
-    if (allocated(simulation%gravity_table%time)) call add(simulation%gravity_table%time)
-    if (allocated(simulation%cell_drive%table%time)) call add(simulation%cell_drive%table%time)
+    if (allocated(simulation%gravity_table%time)) call add_rows(simulation%gravity_table%time)
+    if (allocated(simulation%cell_drive%table%time)) call add_rows(simulation%cell_drive%table%time)
     do b = 1, size(simulation%decomposition%boundaries)
       associate (table => simulation%decomposition%boundaries(b)%drive%table)
-        if (allocated(table%time)) call add(table%time)
+        if (allocated(table%time)) call add_rows(table%time)
       end associate
       if (.not. simulation%decomposition%boundaries(b)%drive%oscillates()) cycle
       call simulation%decomposition%boundaries(b)%drive%find_extremes(extreme)
-      call add(extreme)
+      found(n + 1:n + 2) = min(extreme, end_time)
+      n = n + 2
     end do
+    allocate (times(n))
+    times(:) = found(1:n)
 
   contains
 
-    !> Rows outside the run stand for its begin or its end.
-    subroutine add(rows)
+    !> Rows that are closer to each other than a part of a step count once.
+    subroutine add_rows(rows)
       real(dp), intent(in) :: rows(:)
-      integer :: k
+      real(dp) :: h, last
+      integer :: k, side
 
+      h = simulation%config%time%step
+      last = -huge(last)
       do k = 1, size(rows)
-        n = n + 1
-        times(n) = min(max(rows(k), 0.0_dp), end_time)
+        if (rows(k) < last + close_rows*h .and. k < size(rows)) cycle
+        last = rows(k)
+        do side = -1, 2
+          n = n + 1
+          found(n) = min(max(last + 0.5_dp*side*h, 0.0_dp), end_time)
+        end do
       end do
-    end subroutine add
+    end subroutine add_rows
 
   end subroutine find_times
 
-  !> The largest loads and speeds of the times given.
+  !> The largest loads and speeds of the steps that end at the times given.
   subroutine scan(self, simulation, extent, times)
     type(scene_scales_t), intent(inout) :: self
     type(simulation_t), intent(in) :: simulation
@@ -216,7 +231,7 @@ contains
     do k = 1, size(times)
       if (allocated(simulation%gravity_table%has)) then
         do d = 1, nd
-          if (simulation%gravity_table%has(d)) physics%gravity(d) = simulation%gravity_table%at(d, times(k))
+          if (simulation%gravity_table%has(d)) physics%gravity(d) = simulation%gravity_table%load_of(d, times(k), physics%h)
         end do
       end if
       if (allocated(cell_drive%table%has)) call cell_drive%begin_step(simulation%decomposition%period, nd, simulation%mass, &
@@ -225,9 +240,9 @@ contains
       acceleration(nd + 1:) = 0.0_dp
       if (norm2(acceleration) > norm2(self%acceleration)) self%acceleration(:) = acceleration
       do b = 1, size(boundaries)
-        call boundaries(b)%prescribe(nd, times(k))
+        call boundaries(b)%prescribe(nd, times(k), physics%h)
         if (boundaries(b)%lets_out()) cycle
-        pressure = simulation%velocity_scale%pressure_of(nd, boundaries(b), times(k), area(b))
+        pressure = simulation%velocity_scale%pressure_of(nd, boundaries(b), times(k), physics%h, area(b))
         if (pressure > self%pressure) then
           self%pressure = pressure
           self%pressed = b

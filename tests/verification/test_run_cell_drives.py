@@ -9,6 +9,7 @@ import numpy as np
 from gravier_runs import merged, run_case, write
 from cell_runs import LATTICE, STEP, CellTestCase
 from small_scenes import Grain, bodies_csv
+from time_tables import TimeTable
 
 import gravier
 
@@ -16,7 +17,7 @@ import gravier
 class CellDrives(CellTestCase):
 
     def test_table(self):
-        """Rates and stresses against time: the cell has those of the end of each step. A table of constants is the keys that have them, and a
+        """Rates and stresses against time: the cell has the means of rates about the end of each step, and of stresses over it. A table of constants is the keys that have them, and a
         run goes on with its table after a restart."""
         rows = "time,shear_rate_xy,pressure_y\n9,0.2,1\n"
         constant = {"scene": {"cell_shear_rate": None, "cell_pressure": None, "cell_table": "cell.csv"}}
@@ -37,7 +38,7 @@ class CellDrives(CellTestCase):
         self.assertIn("contents of cell.csv are not those with which ", run.stderr)
         # a table that repeats is the same table written out
         states = []
-        for name, periods in (("repeated table", 1), ("table written out", 4)):
+        for name, periods in (("repeated table", 1), ("table written out", 5)):
             here = self.here(name)
             os.makedirs(here)
             text = "time,shear_rate_xy,pressure_y\n0,0.0,1.0\n"
@@ -55,15 +56,16 @@ class CellDrives(CellTestCase):
         os.makedirs(here)
         grains = [Grain([0.2, 0.2, 0.3], radius=0.01, mass=2.0), Grain([0.7, 0.6, 0.5], radius=0.01, mass=3.0)]
         write(os.path.join(here, "grains.csv"), bodies_csv(grains))
-        write(os.path.join(here, "cell.csv"), "time,pressure_z,shear_rate_yz,shear_stress_xy,strain_rate_x\n"
-                                              "0,3,1.5,0.4,-0.5\n0.1,3,-1.5,-0.4,0.5\n0.2,0,-1.5,0,0.5\n")
+        table = TimeTable([0.0, 0.1, 0.2], {"pressure_z": [3.0, 3.0, 0.0], "shear_rate_yz": [1.5, -1.5, -1.5],
+                                            "shear_stress_xy": [0.4, -0.4, 0.0], "strain_rate_x": [-0.5, 0.5, 0.5]})
+        write(os.path.join(here, "cell.csv"), table.text)
         run = run_case({"scene": {"dimension": 3, "bodies": "file", "bodies_file": "grains.csv", "gravity": [0.0] * 3, "period": [1.0, 1.5, 0.8],
                                   "cell_table": "cell.csv", "cell_inertia": 0.25},
                         "time": {"step": STEP, "steps": 40}, "output": {"directory": "results", "every": 1}}, directory=here)
         self.assert_status(run, 0)
-        found, times = run.results(), STEP * np.arange(1, 41)
-        rate_yz, stress, pressure, rate_x = (np.interp(times, [0.0, 0.1, 0.2], values)
-                                             for values in ((1.5, -1.5, -1.5), (0.4, -0.4, 0.0), (3.0, 3.0, 0.0), (-0.5, 0.5, 0.5)))
+        found = run.results()
+        rate_yz, rate_x = (table.rates(name, STEP, 40)[1:] for name in ("shear_rate_yz", "strain_rate_x"))
+        stress, pressure = (table.loads(name, STEP, 40) for name in ("shear_stress_xy", "pressure_z"))
         state = [(np.diag([1.0, 1.5, 0.8]), np.zeros((3, 3)))]
         state += [tuple(found[f"/steps/{step}/cell/{value}"] for value in ("edge", "velocity")) for step in range(1, 41)]
         for k in range(40):

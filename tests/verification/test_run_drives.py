@@ -7,6 +7,7 @@ from gravier_runs import LONG
 
 import gravier
 from small_scenes import EPS, G, INERTIA, Grain, SmallScene, floats, plane
+from time_tables import TimeTable
 
 RADIUS, MASS = 0.05, 0.7
 
@@ -31,17 +32,14 @@ class Moves(SmallScene):
         """Faster until 0.125 s, then slower: the grain goes with the plane and then flies on."""
         def check(dimension):
             along = np.eye(dimension)[0]
+            table = TimeTable([0.0, 0.125, 0.1875], {"vx": [0.0, 1.0, -0.5]})
             record = self.play(f"table {dimension}", [Grain(RADIUS * along, radius=RADIUS)],
-                               [plane(0 * along, along, table="drive.csv")], steps=128,
-                               files={"drive.csv": "time,vx\n0,0\n0.125,1\n0.1875,-0.5\n"})
-            t = record.time
-            speed = np.interp(t, [0, 0.125, 0.1875], [0, 1, -0.5])
+                               [plane(0 * along, along, table="drive.csv")], steps=128, files={"drive.csv": table.text})
+            speed = table.rates("vx", self.step, 128)
             case = f"plane driven by a table, {dimension}D"
             self.verify(case, "speed of the plane [m/s]", record.boundary["velocity"][1:, 0, 0], speed[1:], 1e-13)
-            self.verify(case, "speed of the grain [m/s]", record.velocity[:, 0, 0], np.maximum.accumulate(speed), 1e-12)
-            # a speed that is linear between the steps makes places exact
-            way = np.concatenate([[0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) * self.step
-            self.verify(case, "place of the plane [m]", record.boundary["position"][:, 0, 0], way, 1e-13)
+            self.verify(case, "speed of the grain [m/s]", record.velocity[:, 0, 0], np.maximum.accumulate(np.concatenate([[0.0], speed[1:]])), 1e-12)
+            self.verify(case, "place of the plane [m]", record.boundary["position"][:, 0, 0], table.ways("vx", self.step, 128), 1e-13)
         self.both(check)
 
     def test_oscillation(self):
@@ -361,7 +359,7 @@ class Forces(SmallScene):
         self.assertAlmostEqual(rate * self.step * record.step[-1], np.arccos(0.1), delta=11 * rate * self.step)
 
     def test_gravity_table(self):
-        """Gravity that grows with t takes the value of the end of each step: a t (t + h) / 2."""
+        """Gravity that grows with t acts with its mean over each step: velocities are a t^2 / 2."""
         def check(dimension):
             axes = "xyz"[:dimension]
             rows = [[0.0] * dimension, [-2.0, -9.0, 4.0][:dimension]]
@@ -370,10 +368,10 @@ class Forces(SmallScene):
             record = self.play(f"gravity table {dimension}", [Grain([0.0] * dimension)], steps=200,
                                scene={"gravity_table": "g.csv"}, files={"g.csv": text})
             t, slope = record.time[:, None], 2.0 * np.array(rows[1])
-            v = slope * t * (t + self.step) / 2
+            v = slope * t * t / 2
             self.verify(f"gravity from a table, {dimension}D", "velocity [m/s]", record.velocity[:, 0], v, 1e-12)
             written = np.transpose([record.run.history()["gravity_" + x] for x in axes])
-            np.testing.assert_allclose(written, (slope * t)[1:], rtol=1e-12)
+            np.testing.assert_allclose(written, (slope * (t - self.step / 2))[1:], rtol=1e-12)
         self.both(check)
 
     def test_body_force(self):

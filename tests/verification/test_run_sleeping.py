@@ -292,7 +292,7 @@ class Sleeping(RunTestCase):
             self.assertGreater(history["sleeping"][195] / history["contacts"][195], 0.9)
         # of the contacts with the wall and their neighbours
         asleep = runs[0].history()["sleeping"]
-        self.assertGreater(asleep[199], asleep[201])
+        self.assertGreater(asleep[198], asleep[201])
         self.assertGreater(asleep[-1], 0)
         self.assertEqual(runs[1].history()["sleeping"][202:].tolist(), [0] * 8)
 

@@ -316,28 +316,28 @@ contains
     call rigid_velocity(image, self%pivot, self%last_velocity, self%last_spin, velocity)
   end subroutine boundary_last_velocity_at
 
-  !> Set the prescribed velocity and spin of a time; free components are left.
-  pure subroutine boundary_prescribe(self, nd, time)
+  !> Set the prescribed velocity and spin of the end of a step; free components are left.
+  pure subroutine boundary_prescribe(self, nd, time, step)
     class(boundary_t), intent(inout) :: self
     integer, intent(in) :: nd
     !> [s]
-    real(dp), intent(in) :: time
+    real(dp), intent(in) :: time, step
     integer :: d
 
     do d = 1, nd
-      if (.not. self%free(d)) self%velocity(d) = self%drive%velocity_at(d, time)
+      if (.not. self%free(d)) self%velocity(d) = self%drive%velocity_at(d, time, step)
     end do
     do d = merge(3, 1, nd == 2), 3
-      self%spin(d) = self%drive%spin_at(d, time)
+      self%spin(d) = self%drive%spin_at(d, time, step)
     end do
   end subroutine boundary_prescribe
 
-  !> Force of the user on the free components at a time [N].
-  pure subroutine boundary_applied_force(self, nd, time, area, force)
+  !> Force of the user on the free components in the step that ends at a time [N].
+  pure subroutine boundary_applied_force(self, nd, time, step, area, force)
     class(boundary_t), intent(in) :: self
     integer, intent(in) :: nd
     !> [s]; the area that a pressure works on [m^2, m in 2D]
-    real(dp), intent(in) :: time, area
+    real(dp), intent(in) :: time, step, area
     !> (nd); 0 on other components
     real(dp), intent(out) :: force(:)
     real(dp) :: normal(3)
@@ -348,22 +348,23 @@ contains
     if (allocated(self%surface)) normal(:) = self%surface%axis
     do d = 1, nd
       if (.not. self%free(d)) cycle
-      force(d) = self%drive%force_at(d, time) + self%drive%pressure_at(time)*area*normal(d)
+      force(d) = self%drive%force_at(d, time, step) + self%drive%pressure_at(time, step)*area*normal(d)
     end do
   end subroutine boundary_applied_force
 
-  !> Whether the force or the pressure that moves it differs between two times.
-  pure logical function boundary_load_changes(self, since, time) result(changes)
+  !> Whether the force or the pressure that moves it in the step that ends at a time differs from that of the step before.
+  pure logical function boundary_load_changes(self, time, step) result(changes)
     class(boundary_t), intent(in) :: self
     !> [s]
-    real(dp), intent(in) :: since, time
+    real(dp), intent(in) :: time, step
     integer :: d
 
     changes = .false.
     if (.not. (self%is_driven() .and. self%drive%changes())) return
-    changes = abs(self%drive%pressure_at(time) - self%drive%pressure_at(since)) > 0.0_dp
+    changes = abs(self%drive%pressure_at(time, step) - self%drive%pressure_at(time - step, step)) > 0.0_dp
     do d = 1, 3
-      if (self%free(d)) changes = changes .or. abs(self%drive%force_at(d, time) - self%drive%force_at(d, since)) > 0.0_dp
+      if (self%free(d)) changes = changes .or. &
+        & abs(self%drive%force_at(d, time, step) - self%drive%force_at(d, time - step, step)) > 0.0_dp
     end do
   end function boundary_load_changes
 

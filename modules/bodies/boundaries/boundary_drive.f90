@@ -5,7 +5,7 @@ module gravier_boundary_drive
   use gravier_time_table, only: time_table_t
   implicit none
   private
-  public :: boundary_drive_t, drive_names
+  public :: boundary_drive_t, drive_names, drive_rates
 
   !> Quantities that a table may give. `gives` asks by these names.
   integer, parameter, public :: drives_velocity = 1, drives_spin = 2, drives_force = 3, drives_pressure = 4
@@ -58,6 +58,12 @@ contains
     if (nd == 2) names = names_2d
   end function drive_names
 
+  !> How many of these columns, which come first, are velocities and spins.
+  pure integer function drive_rates(nd)
+    integer, intent(in) :: nd
+    drive_rates = merge(3, 6, nd == 2)
+  end function drive_rates
+
   !> The column of the table that gives a quantity along or about axis `k`, 0 where there is none.
   pure integer function column_of(self, quantity, k) result(column)
     type(boundary_drive_t), intent(in) :: self
@@ -85,16 +91,21 @@ contains
     end if
   end function column_of
 
-  !> A quantity at a time: what the table gives, else the constant.
-  pure real(dp) function given(self, quantity, k, time, constant) result(value)
+  !> A quantity at the end of a step, or in that step if it is a load: what the table gives, else the constant.
+  pure real(dp) function given(self, quantity, k, time, step, constant) result(value)
     type(boundary_drive_t), intent(in) :: self
     integer, intent(in) :: quantity, k
-    real(dp), intent(in) :: time, constant
+    real(dp), intent(in) :: time, step, constant
     integer :: column
 
     value = constant
     column = column_of(self, quantity, k)
-    if (column > 0) value = self%table%at(column, time)
+    if (column == 0) return
+    if (quantity == drives_velocity .or. quantity == drives_spin) then
+      value = self%table%rate_at(column, time, step)
+    else
+      value = self%table%load_of(column, time, step)
+    end if
   end function given
 
   !> d/dt of sin(2 pi f t + phase) [1/s].
@@ -106,25 +117,25 @@ contains
     rate = two_pi*self%frequency*cos(two_pi*modulo(self%frequency*time, 1.0_dp) + self%phase)
   end function rate_of_sine
 
-  !> Prescribed velocity along axis `d` at a time [m/s].
-  pure real(dp) function boundary_drive_velocity_at(self, d, time) result(velocity)
+  !> Prescribed velocity along axis `d` at the end of a step [m/s].
+  pure real(dp) function boundary_drive_velocity_at(self, d, time, step) result(velocity)
     class(boundary_drive_t), intent(in) :: self
     integer, intent(in) :: d
     !> [s]
-    real(dp), intent(in) :: time
+    real(dp), intent(in) :: time, step
 
-    velocity = given(self, drives_velocity, d, time, self%velocity(d))
+    velocity = given(self, drives_velocity, d, time, step, self%velocity(d))
     if (abs(self%oscillation(d)) > 0.0_dp) velocity = velocity + self%oscillation(d)*rate_of_sine(self, time)
   end function boundary_drive_velocity_at
 
-  !> Prescribed rate of rotation about axis `k` at a time [rad/s].
-  pure real(dp) function boundary_drive_spin_at(self, k, time) result(spin)
+  !> Prescribed rate of rotation about axis `k` at the end of a step [rad/s].
+  pure real(dp) function boundary_drive_spin_at(self, k, time, step) result(spin)
     class(boundary_drive_t), intent(in) :: self
     integer, intent(in) :: k
     !> [s]
-    real(dp), intent(in) :: time
+    real(dp), intent(in) :: time, step
 
-    spin = given(self, drives_spin, k, time, self%spin(k))
+    spin = given(self, drives_spin, k, time, step, self%spin(k))
     if (abs(self%rotation_oscillation(k)) > 0.0_dp) spin = spin + self%rotation_oscillation(k)*rate_of_sine(self, time)
   end function boundary_drive_spin_at
 
@@ -138,21 +149,21 @@ contains
     if (self%oscillates()) beside = time + sign(min(abs(duration), 0.25_dp/self%frequency), duration)
   end function boundary_drive_time_beside
 
-  !> Force of the user along axis `d` at a time [N].
-  pure real(dp) function boundary_drive_force_at(self, d, time) result(force)
+  !> Force of the user along axis `d` in the step that ends at a time [N].
+  pure real(dp) function boundary_drive_force_at(self, d, time, step) result(force)
     class(boundary_drive_t), intent(in) :: self
     integer, intent(in) :: d
     !> [s]
-    real(dp), intent(in) :: time
-    force = given(self, drives_force, d, time, self%force(d))
+    real(dp), intent(in) :: time, step
+    force = given(self, drives_force, d, time, step, self%force(d))
   end function boundary_drive_force_at
 
-  !> Pressure of the user at a time [Pa, N/m in 2D].
-  pure real(dp) function boundary_drive_pressure_at(self, time) result(pressure)
+  !> Pressure of the user in the step that ends at a time [Pa, N/m in 2D].
+  pure real(dp) function boundary_drive_pressure_at(self, time, step) result(pressure)
     class(boundary_drive_t), intent(in) :: self
     !> [s]
-    real(dp), intent(in) :: time
-    pressure = given(self, drives_pressure, 1, time, self%pressure)
+    real(dp), intent(in) :: time, step
+    pressure = given(self, drives_pressure, 1, time, step, self%pressure)
   end function boundary_drive_pressure_at
 
   !> Whether the table gives a quantity along or about axis `k`.

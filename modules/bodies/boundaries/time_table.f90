@@ -1,5 +1,11 @@
 !> Quantities given in a table against time: linear between the rows, constant before the first. After the last they are constant,
 !> or the table begins anew.
+!>
+!> A step takes means over a time of its own length, so that nothing is lost of a quantity that jumps or turns within it. What acts
+!> during a step has its mean over the step: impulses add up to the integral of the table. What moves something, as h/2 times the
+!> sum of its values at both ends of a step, has at the end of a step the mean over the time from half a step before to half a step
+!> after it: ways add up to the mean of the integrals of the table up to these two times. A mean between two rows is the value in
+!> the middle, and one between equal rows is theirs to the last bit.
 module gravier_time_table
   use gravier_kinds, only: dp, i8
   use gravier_errors, only: error_t
@@ -9,6 +15,11 @@ module gravier_time_table
   implicit none
   private
   public :: time_table_t
+
+  !> steps, and at most so many cycles, in which the ups and downs of a table that begins anew are looked at
+  real(dp), parameter :: some_steps = 20.0_dp, most_cycles = 100.0_dp
+  !> of a time, in steps
+  real(dp), parameter :: rounding = 1.0e-6_dp
 
   !> Columns of a CSV file with a header; `time` is one of them.
   type :: time_table_t
@@ -23,12 +34,21 @@ module gravier_time_table
   contains
     procedure :: read => time_table_read
     procedure :: at => time_table_at
+    procedure :: mean => time_table_mean
+    procedure :: rate_at => time_table_rate_at
+    procedure :: load_of => time_table_load_of
     procedure :: changes_after => time_table_changes_after
     procedure :: kept_variation => time_table_kept_variation
-    procedure :: miss_way => time_table_miss_way
     procedure :: shortest_half_cycle => time_table_shortest_half_cycle
     procedure :: digest => time_table_digest
   end type time_table_t
+
+  !> Where a time lies in a table: the row before it, 0 before the first; the time in the first cycle [s]; cycles that lie between.
+  type :: place_t
+    integer :: row = 0
+    real(dp) :: at = 0.0_dp
+    integer(i8) :: cycle = 0
+  end type place_t
 
 contains
 
@@ -169,39 +189,129 @@ contains
     call move_alloc(value, self%value)
   end subroutine set_room
 
+  !> Where a time lies in the table.
+  pure type(place_t) function place_of(self, time) result(place)
+    type(time_table_t), intent(in) :: self
+    !> [s]
+    real(dp), intent(in) :: time
+    real(dp) :: since
+    integer :: high, middle
+
+    high = size(self%time)
+    place%at = time
+    if (self%period > 0.0_dp .and. time >= self%time(high)) then
+      since = modulo(time - self%time(1), self%period)
+      place%cycle = nint((time - self%time(1) - since)/self%period, i8)
+      place%at = self%time(1) + since
+    else if (place%at >= self%time(high)) then
+      place%row = high
+      return
+    end if
+    do while (high - place%row > 1)
+      middle = (place%row + high)/2
+      if (self%time(middle) <= place%at) then
+        place%row = middle
+      else
+        high = middle
+      end if
+    end do
+  end function place_of
+
+  !> Value of column `k` behind a row and before the next one.
+  pure real(dp) function value_behind(self, k, row, at) result(value)
+    type(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> 0 before the first row
+    integer, intent(in) :: row
+    !> in the first cycle [s]
+    real(dp), intent(in) :: at
+    real(dp) :: share
+
+    value = self%value(k, max(row, 1))
+    if (row == 0 .or. row == size(self%time)) return
+    ! between equal rows the value is theirs, without rounding
+    if (.not. abs(self%value(k, row + 1) - value) > 0.0_dp) return
+    share = min((at - self%time(row))/(self%time(row + 1) - self%time(row)), 1.0_dp)
+    value = (1.0_dp - share)*value + share*self%value(k, row + 1)
+  end function value_behind
+
   !> Value of column `k` at a time.
   pure real(dp) function time_table_at(self, k, time) result(value)
     class(time_table_t), intent(in) :: self
     integer, intent(in) :: k
     !> [s]
     real(dp), intent(in) :: time
-    integer :: low, high, middle
-    real(dp) :: at, share
 
-    low = 1
-    high = size(self%time)
-    at = time
-    if (self%period > 0.0_dp .and. time > self%time(high)) at = self%time(low) + modulo(time - self%time(low), self%period)
-    if (at <= self%time(low)) then
-      value = self%value(k, low)
-    else if (at >= self%time(high)) then
-      value = self%value(k, high)
-    else
-      do while (high - low > 1)
-        middle = (low + high)/2
-        if (self%time(middle) <= at) then
-          low = middle
-        else
-          high = middle
-        end if
-      end do
-      value = self%value(k, low)
-      ! between equal rows the value is theirs, without rounding
-      if (.not. abs(self%value(k, high) - value) > 0.0_dp) return
-      share = (at - self%time(low))/(self%time(high) - self%time(low))
-      value = (1.0_dp - share)*value + share*self%value(k, high)
-    end if
+    associate (place => place_of(self, time))
+      value = value_behind(self, k, place%row, place%at)
+    end associate
   end function time_table_at
+
+  !> Mean of column `k` from a time to a later one; the value of the time where both are one. It takes a look at each row between
+  !> them, and at each row of the table where they are more than a cycle apart.
+  pure real(dp) function time_table_mean(self, k, from, to) result(mean)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: from, to
+    type(place_t) :: first, last
+    real(dp) :: area
+    integer :: n
+
+    first = place_of(self, from)
+    last = place_of(self, to)
+    n = size(self%time)
+    if (first%row == last%row .and. first%cycle == last%cycle) then
+      mean = value_behind(self, k, first%row, first%at + 0.5_dp*(last%at - first%at))
+      return
+    end if
+    ! what differs from the first value is added up, so that equal rows have no rounding
+    mean = value_behind(self, k, first%row, first%at)
+    area = 0.5_dp*(self%time(first%row + 1) - first%at)*(self%value(k, first%row + 1) - mean)
+    if (first%cycle == last%cycle) then
+      area = area + area_between(self, k, first%row + 1, last%row, mean)
+    else
+      area = area + area_between(self, k, first%row + 1, n, mean) + area_between(self, k, 1, last%row, mean)
+      if (last%cycle - first%cycle > 1) area = area + real(last%cycle - first%cycle - 1, dp)*area_between(self, k, 1, n, mean)
+    end if
+    area = area + 0.5_dp*(last%at - self%time(last%row))*((self%value(k, last%row) - mean) + &
+      & (value_behind(self, k, last%row, last%at) - mean))
+    mean = mean + area/(to - from)
+  end function time_table_mean
+
+  !> Integral, from one row to another, of what column `k` is above a value [unit of the column times s].
+  pure real(dp) function area_between(self, k, first, last, value) result(area)
+    type(time_table_t), intent(in) :: self
+    integer, intent(in) :: k, first, last
+    real(dp), intent(in) :: value
+    integer :: row
+
+    area = 0.0_dp
+    do row = first, last - 1
+      area = area + 0.5_dp*(self%time(row + 1) - self%time(row))*((self%value(k, row) - value) + (self%value(k, row + 1) - value))
+    end do
+  end function area_between
+
+  !> What column `k` prescribes at the end of a step, of what moves something: the mean over the time from half a step before it to
+  !> half a step after it. At the time 0 it is that of the half step that follows: the way is that of the table from the start.
+  pure real(dp) function time_table_rate_at(self, k, time, step) result(rate)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: time, step
+
+    rate = self%mean(k, max(time - 0.5_dp*step, min(time, 0.0_dp)), time + 0.5_dp*step)
+  end function time_table_rate_at
+
+  !> What column `k` makes act in the step that ends at a time: the mean over this step.
+  pure real(dp) function time_table_load_of(self, k, time, step) result(load)
+    class(time_table_t), intent(in) :: self
+    integer, intent(in) :: k
+    !> [s]
+    real(dp), intent(in) :: time, step
+
+    load = self%mean(k, time - step, time)
+  end function time_table_load_of
 
   !> Whether some quantity has another value later than it has at a time. The table has been read.
   pure logical function time_table_changes_after(self, time) result(changes)
@@ -221,128 +331,64 @@ contains
   end function time_table_changes_after
 
   !> What steps keep of the ups and downs of the quantities until some step, for the quantity that loses most: the sum of the
-  !> changes from step to step over that of the changes from row to row. 1 where nothing turns within a step. The table has been
-  !> read.
-  pure real(dp) function time_table_kept_variation(self, step, steps) result(share)
+  !> changes from step to step over that of the changes from row to row. Near 1 where nothing turns within a step. Of a table that
+  !> begins anew, some steps or the first two cycles count. The table has been read.
+  pure real(dp) function time_table_kept_variation(self, n_rates, step, steps) result(share)
     class(time_table_t), intent(in) :: self
+    !> columns that move something, which come first; the others act
+    integer, intent(in) :: n_rates
     !> [s]
     real(dp), intent(in) :: step
     integer, intent(in) :: steps
-    !> of a row and of the end, in steps: roundings of times are none
-    real(dp), parameter :: rounding = 1.0e-6_dp
-    real(dp) :: kept, whole, last, sample, from, to
-    integer :: k, row, n
+    real(dp) :: kept, whole, last, until, begin
+    integer :: k, row, n, next, near, cycles, turn
 
     share = 1.0_dp
+    until = steps*step
+    cycles = 1
+    if (self%period > 0.0_dp) then
+      cycles = 1 + ceiling(min(some_steps*step/self%period, most_cycles))
+      until = min(until, self%time(1) + cycles*self%period)
+    end if
     do k = 1, size(self%has)
       if (.not. self%has(k)) cycle
       kept = 0.0_dp
       whole = 0.0_dp
       last = self%at(k, 0.0_dp)
-      do row = 1, size(self%time) - 1
-        from = max(self%time(row), 0.0_dp)
-        to = min(self%time(row + 1), steps*step)
-        if (.not. to > from) cycle
-        whole = whole + abs(self%at(k, to) - self%at(k, from))
-        ! between two rows the first and the last step count
-        do n = 1, 2
-          if (n == 1) sample = real(ceiling(from/step - rounding, i8), dp)
-          if (n == 2) sample = real(floor(to/step + rounding, i8), dp)
-          if (sample*step < from - rounding*step .or. sample*step > to + rounding*step) cycle
-          kept = kept + abs(self%at(k, sample*step) - last)
-          last = self%at(k, sample*step)
+      next = 1
+      do turn = 0, cycles - 1
+        begin = turn*self%period
+        do row = 1, size(self%time)
+          ! between two rows all is linear in time, but for the means of the steps beside them
+          near = floor(min(max(begin + self%time(row), 0.0_dp), until)/step)
+          do n = max(next, near - 1), min(near + 2, floor(until/step + rounding))
+            kept = kept + abs(step_mean(n) - last)
+            last = step_mean(n)
+            next = n + 1
+          end do
+          if (row == size(self%time)) exit
+          associate (from => max(begin + self%time(row), 0.0_dp), to => min(begin + self%time(row + 1), until))
+            if (to > from) whole = whole + abs(self%at(k, to) - self%at(k, from))
+          end associate
         end do
       end do
+      kept = kept + abs(self%at(k, until) - last)
       if (whole > 0.0_dp) share = min(share, kept/whole)
     end do
+
+  contains
+
+    pure real(dp) function step_mean(n)
+      integer, intent(in) :: n
+
+      if (k <= n_rates) then
+        step_mean = self%rate_at(k, n*step, step)
+      else
+        step_mean = self%load_of(k, n*step, step)
+      end if
+    end function step_mean
+
   end function time_table_kept_variation
-
-  !> By how much the way that steps make at the rates of column `k` misses the integral of the column at the end of a run, and the
-  !> range of that integral at the rows and at the end. Steps make h (theta v(end) + (1 - theta) v(begin)); a jump within a step is
-  !> then a ramp of its length, and jumps of a table that repeats may add up. The table has been read.
-  pure subroutine time_table_miss_way(self, k, step, theta, steps, missed, range)
-    class(time_table_t), intent(in) :: self
-    integer, intent(in) :: k, steps
-    !> [s], weight of the end of a step
-    real(dp), intent(in) :: step, theta
-    !> [unit of the column times s]
-    real(dp), intent(out) :: missed, range
-    real(dp) :: way, exact, begin, low, high, until, corner, last
-    integer(i8) :: cycles, turn, n, next
-    integer :: row
-
-    until = steps*step
-    ! steps without a row inside follow the table
-    missed = (theta - 0.5_dp)*step*(self%at(k, until) - self%at(k, 0.0_dp))
-    cycles = 0
-    if (self%period > 0.0_dp) cycles = int((until - self%time(1))/self%period, i8)
-    n = -1
-    last = 0.0_dp
-    do turn = 0, max(cycles, 0_i8)
-      do row = 1, size(self%time)
-        corner = self%time(row) + turn*self%period
-        if (corner <= 0.0_dp) cycle
-        if (corner >= until) exit
-        next = int(corner/step, i8)
-        if (next /= n) then
-          if (n >= 0) missed = missed - trapezium(self, k, last, (n + 1)*step)
-          missed = missed + trapezium(self, k, next*step, (next + 1)*step)
-          last = next*step
-          n = next
-        end if
-        missed = missed - trapezium(self, k, last, corner)
-        last = corner
-      end do
-    end do
-    if (n >= 0) missed = missed - trapezium(self, k, last, (n + 1)*step)
-    missed = abs(missed)
-    begin = integral(self, k, 0.0_dp)
-    exact = integral(self, k, until) - begin
-    low = min(0.0_dp, exact)
-    high = max(0.0_dp, exact)
-    way = 0.0_dp
-    do row = 1, size(self%time) - 1
-      if (self%time(row) >= until) exit
-      way = way + 0.5_dp*(self%time(row + 1) - self%time(row))*(self%value(k, row) + self%value(k, row + 1))
-      low = min(low, way - begin)
-      high = max(high, way - begin)
-    end do
-    range = high - low
-  end subroutine time_table_miss_way
-
-  !> Integral of column `k` between two times, if it is linear between them [unit of the column times s].
-  pure real(dp) function trapezium(self, k, from, to)
-    type(time_table_t), intent(in) :: self
-    integer, intent(in) :: k
-    !> [s]
-    real(dp), intent(in) :: from, to
-    trapezium = 0.5_dp*(to - from)*(self%at(k, from) + self%at(k, to))
-  end function trapezium
-
-  !> Integral of column `k` from the first row to a time [unit of the column times s].
-  pure real(dp) function integral(self, k, time) result(sum_until)
-    type(time_table_t), intent(in) :: self
-    integer, intent(in) :: k
-    !> [s]
-    real(dp), intent(in) :: time
-    real(dp) :: at, cycles
-    integer :: row, last
-
-    last = size(self%time)
-    at = time
-    cycles = 0.0_dp
-    if (self%period > 0.0_dp .and. time > self%time(last)) then
-      cycles = real(floor((time - self%time(1))/self%period, i8), dp)
-      at = time - cycles*self%period
-    end if
-    sum_until = min(at - self%time(1), 0.0_dp)*self%value(k, 1) + max(at - self%time(last), 0.0_dp)*self%value(k, last)
-    do row = 1, last - 1
-      associate (from => self%time(row), to => self%time(row + 1))
-        if (at > from) sum_until = sum_until + 0.5_dp*(min(at, to) - from)*(self%value(k, row) + self%at(k, min(at, to)))
-        sum_until = sum_until + 0.5_dp*cycles*(to - from)*(self%value(k, row) + self%value(k, row + 1))
-      end associate
-    end do
-  end function integral
 
   !> A number that tells tables of other columns, times or values apart; the table has been read.
   pure integer(i8) function time_table_digest(self) result(digest)

@@ -161,9 +161,8 @@ contains
 
     do b = 1, size(earlier)
       earlier(b) = step%decomposition%boundaries(b)
-      call earlier(b)%prescribe(step%decomposition%nd, step%time)
       earlier(b)%velocity(:) = earlier(b)%last_velocity
-      if (earlier(b)%drive%steered) earlier(b)%spin(:) = earlier(b)%last_spin
+      earlier(b)%spin(:) = earlier(b)%last_spin
     end do
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)

@@ -71,7 +71,7 @@ contains
     end do
   end subroutine turn_bodies
 
-  !> Gravity and the velocities of boundaries at the end of the step, without contacts.
+  !> Gravity in the step, and the velocities of boundaries at its end without contacts.
   subroutine drive(decomposition, physics, gravity_table, time, changed)
     type(decomposition_t), intent(inout) :: decomposition
     type(physics_t), intent(inout) :: physics
@@ -89,18 +89,18 @@ contains
     if (allocated(gravity_table%has)) then
       do d = 1, nd
         if (.not. gravity_table%has(d)) cycle
-        physics%gravity(d) = gravity_table%at(d, end_time)
-        changed = changed .or. abs(physics%gravity(d) - gravity_table%at(d, time)) > 0.0_dp
+        physics%gravity(d) = gravity_table%load_of(d, end_time, physics%h)
+        changed = changed .or. abs(physics%gravity(d) - gravity_table%load_of(d, time, physics%h)) > 0.0_dp
       end do
     end if
     do b = 1, size(decomposition%boundaries)
       associate (boundary => decomposition%boundaries(b))
         boundary%last_velocity(:) = boundary%velocity
         boundary%last_spin(:) = boundary%spin
-        call boundary%prescribe(nd, end_time)
+        call boundary%prescribe(nd, end_time, physics%h)
         if (.not. boundary%is_driven()) cycle
-        changed = changed .or. boundary%load_changes(time, end_time)
-        call boundary%applied_force(nd, end_time, facing_area(decomposition, b), force)
+        changed = changed .or. boundary%load_changes(end_time, physics%h)
+        call boundary%applied_force(nd, end_time, physics%h, facing_area(decomposition, b), force)
         do d = 1, nd
           if (boundary%free(d)) boundary%velocity(d) = boundary%velocity(d) + physics%h*force(d)/boundary%mass
         end do

@@ -58,20 +58,20 @@ contains
     stress_sign = merge(1.0_dp, -1.0_dp, row == column)
   end function stress_sign
 
-  !> Take the rates and stresses of a time from the table, where there is one.
-  pure subroutine cell_drive_set_time(self, nd, time)
+  !> Take the rates of the end of a step and the stresses in this step from the table, where there is one.
+  pure subroutine cell_drive_set_time(self, nd, time, h)
     class(cell_drive_t), intent(inout) :: self
     integer, intent(in) :: nd
-    !> [s]
-    real(dp), intent(in) :: time
+    !> end of the step, and step [s]
+    real(dp), intent(in) :: time, h
     integer :: k, n
 
     if (.not. allocated(self%table%has)) return
     n = cell_components(nd)
     do k = 1, n
       associate (a => component_row(cell_component(k, nd)), b => component_column(cell_component(k, nd)))
-        if (self%table%has(k)) self%rate(a, b) = self%table%at(k, time)
-        if (self%table%has(n + k)) self%stress(a, b) = stress_sign(a, b)*self%table%at(n + k, time)
+        if (self%table%has(k)) self%rate(a, b) = self%table%rate_at(k, time, h)
+        if (self%table%has(n + k)) self%stress(a, b) = stress_sign(a, b)*self%table%load_of(n + k, time, h)
       end associate
     end do
   end subroutine cell_drive_set_time
@@ -97,7 +97,7 @@ contains
     integer, intent(in) :: nd
     !> of the grains [kg]; step [s]
     real(dp), intent(in) :: mass, h
-    !> at the end of the step, whose rates and stresses count [s]
+    !> at the end of the step [s]
     real(dp), intent(in) :: time
     type(cell_motion_t), intent(out) :: motion
     real(dp) :: volume, gradient(3, 3)
@@ -105,7 +105,7 @@ contains
 
     motion%moves = period%moves
     if (.not. motion%moves) return
-    call self%set_time(nd, time)
+    call self%set_time(nd, time, h)
     motion%driven(:, :) = self%driven
     motion%is_driven = any(self%driven)
     gradient(:, :) = period%gradient()
@@ -120,15 +120,15 @@ contains
       motion%free = motion%before - volume*motion%impulse/motion%inertia
     end where
     motion%now(:, :) = motion%free
-    if (allocated(self%table%has)) motion%fastest = fastest_beside(self, nd, time, steps_beside*h)
+    if (allocated(self%table%has)) motion%fastest = fastest_beside(self, nd, time, h)
   end subroutine cell_drive_begin_step
 
-  !> Norm of the rates that are given, the larger one of some duration before and after a time [1/s].
-  pure real(dp) function fastest_beside(self, nd, time, duration) result(fastest)
+  !> Norm of the rates that are given, the larger one of some steps before and after a time [1/s].
+  pure real(dp) function fastest_beside(self, nd, time, h) result(fastest)
     type(cell_drive_t), intent(in) :: self
     integer, intent(in) :: nd
     !> [s]
-    real(dp), intent(in) :: time, duration
+    real(dp), intent(in) :: time, h
     real(dp) :: rate(3, 3)
     integer :: k, side
 
@@ -137,7 +137,7 @@ contains
       rate(:, :) = merge(0.0_dp, self%rate, self%driven)
       do k = 1, cell_components(nd)
         if (self%table%has(k)) rate(component_row(cell_component(k, nd)), component_column(cell_component(k, nd))) = &
-          & self%table%at(k, time + side*duration)
+          & self%table%rate_at(k, time + side*steps_beside*h, h)
       end do
       fastest = max(fastest, norm2(rate))
     end do

@@ -106,8 +106,8 @@ contains
     do b = 1, size(boundaries)
       then = boundaries(b)%drive%time_beside(time, duration)
       do d = 1, 3
-        velocity(d, b) = boundaries(b)%drive%velocity_at(d, then)
-        spin(d, b) = boundaries(b)%drive%spin_at(d, then)
+        velocity(d, b) = boundaries(b)%drive%velocity_at(d, then, physics%h)
+        spin(d, b) = boundaries(b)%drive%spin_at(d, then, physics%h)
       end do
     end do
     call compare(nd, boundaries, velocity, spin, lever, physics, beside)

@@ -427,10 +427,8 @@ contains
     integer, intent(in) :: nd
     type(boundary_t), intent(in) :: boundaries(:)
     type(physics_t), intent(in) :: physics
-    !> at which the loads of boundaries act [s]
-    real(dp), intent(in) :: time
-    !> (boundaries) [m^2, m in 2D]
-    real(dp), intent(in) :: area(:)
+    !> end of the step in which the loads of boundaries act [s]; (boundaries) [m^2, m in 2D]
+    real(dp), intent(in) :: time, area(:)
     integer :: b
 
     load = 0.0_dp
@@ -439,22 +437,23 @@ contains
     if (physics%cell%is_driven) load = max(load, maxval(abs(physics%cell%impulse))*self%diameter**(nd - 1)/self%mass)
     do b = 1, size(boundaries)
       ! what is smaller than a grain presses on one with all of its force
-      load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, area(b))*min(area(b), self%diameter**(nd - 1))/self%mass)
+      load = max(load, physics%h*self%pressure_of(nd, boundaries(b), time, physics%h, area(b))* &
+        & min(area(b), self%diameter**(nd - 1))/self%mass)
     end do
   end function velocity_scale_load_of
 
   !> Force on a boundary over the area that it works on [Pa, N/m in 2D]; 0 where no force moves it.
-  pure real(dp) function velocity_scale_pressure_of(self, nd, boundary, time, area) result(pressure)
+  pure real(dp) function velocity_scale_pressure_of(self, nd, boundary, time, step, area) result(pressure)
     class(velocity_scale_t), intent(in) :: self
     integer, intent(in) :: nd
     type(boundary_t), intent(in) :: boundary
-    !> [s], [m^2, m in 2D]
-    real(dp), intent(in) :: time, area
+    !> end of the step and step [s], [m^2, m in 2D]
+    real(dp), intent(in) :: time, step, area
     real(dp) :: force(nd)
 
     pressure = 0.0_dp
     if (.not. (boundary%is_driven() .and. boundary%present .and. area > 0.0_dp) .or. self%diameter <= 0.0_dp) return
-    call boundary%applied_force(nd, time, area, force)
+    call boundary%applied_force(nd, time, step, area, force)
     pressure = norm2(force)/area
   end function velocity_scale_pressure_of
 

@@ -236,7 +236,7 @@ contains
     integer :: b
 
     do b = 1, size(simulation%decomposition%boundaries)
-      call simulation%decomposition%boundaries(b)%prescribe(simulation%decomposition%nd, 0.0_dp)
+      call simulation%decomposition%boundaries(b)%prescribe(simulation%decomposition%nd, 0.0_dp, simulation%physics%h)
     end do
   end subroutine prescribe
 

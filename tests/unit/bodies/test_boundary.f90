@@ -334,7 +334,7 @@ contains
       call b%drive%table%read(file, names, .false., error)
       call check(.not. allocated(error), "table of drives")
       if (allocated(error)) return
-      call b%prescribe(nd, 1.0_dp)
+      call b%prescribe(nd, 1.0_dp, 0.1_dp)
       expected(1:3) = [11.0_dp, 12.0_dp, 13.0_dp]
       if (nd == 3) expected(4:10) = [14.0_dp, 15.0_dp, 16.0_dp, 17.0_dp, 18.0_dp, 19.0_dp, 20.0_dp]
       if (nd == 2) expected(3:6) = [16.0_dp, 17.0_dp, 18.0_dp, 20.0_dp]
@@ -345,16 +345,17 @@ contains
       b%drive%spin(:) = 0.0_dp
       call check(b%drive%turns() .eqv. (k > nd .and. k <= merge(3, 6, nd == 2)), "turning by a column")
       b%free(:) = .true.
-      call b%applied_force(nd, 1.0_dp, 0.0_dp, force(1:nd))
+      call b%applied_force(nd, 1.05_dp, 0.1_dp, 0.0_dp, force(1:nd))
       found(n - nd:n - 1) = force(1:nd)
-      call b%applied_force(nd, 1.0_dp, 2.0_dp, force(1:nd))
+      call b%applied_force(nd, 1.05_dp, 0.1_dp, 2.0_dp, force(1:nd))
       ! the axis is the first one
       found(n) = (force(1) - found(n - nd))/2.0_dp
       call check_vector(found(1:n), expected(1:n), 100*rounding, "driven by "//names)
-      call check(b%load_changes(1.0_dp, 1.1_dp) .eqv. k >= n - nd, "a load that changes by a column of a table")
-      call check(.not. b%load_changes(2.0_dp, 2.1_dp), "a load after the last row of a table")
+      call check(b%load_changes(1.1_dp, 0.1_dp) .eqv. k >= n - nd, "a load that changes by a column of a table")
+      call check(b%load_changes(2.1_dp, 0.1_dp) .eqv. k >= n - nd, "a load that changed within the step before")
+      call check(.not. b%load_changes(2.2_dp, 0.1_dp), "a load after the last row of a table")
       b%free(:) = .false.
-      call check(.not. b%load_changes(1.0_dp, 1.1_dp), "a load that moves nothing")
+      call check(.not. b%load_changes(1.1_dp, 0.1_dp), "a load that moves nothing")
     end do
   end subroutine test_drives
 
@@ -386,27 +387,27 @@ contains
     b%drive%phase = 0.25_dp*pi
     call check(b%drive%changes() .and. b%drive%changes_after(1.0e9_dp) .and. .not. b%drive%turns(), "it goes on for ever")
     ! 1 + A 2 pi f cos(2 pi f t + pi/4), where f t is 1/8 and then 3/8 beyond whole periods
-    call check_close(b%drive%velocity_at(2, 1.0e6_dp + 0.0625_dp), 1.0_dp, 1.0e-8_dp, "velocity where it turns round")
-    call check_close(b%drive%velocity_at(2, 0.1875_dp), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "velocity half-way")
-    call check_close(b%drive%velocity_at(1, 0.1875_dp), 0.0_dp, 0.0_dp, "velocity along another axis")
+    call check_close(b%drive%velocity_at(2, 1.0e6_dp + 0.0625_dp, 0.01_dp), 1.0_dp, 1.0e-8_dp, "velocity where it turns round")
+    call check_close(b%drive%velocity_at(2, 0.1875_dp, 0.01_dp), 1.0_dp - 2.0_dp*pi, 1.0e-14_dp, "velocity half-way")
+    call check_close(b%drive%velocity_at(1, 0.1875_dp, 0.01_dp), 0.0_dp, 0.0_dp, "velocity along another axis")
     call check_close(b%drive%time_beside(0.0625_dp, 9.0_dp), 0.1875_dp, 0.0_dp, "a quarter of a period later")
     call check_close(b%drive%time_beside(0.0625_dp, -9.0_dp), -0.0625_dp, 0.0_dp, "a quarter of a period before")
     call check_close(b%drive%time_beside(0.0625_dp, 0.0625_dp), 0.125_dp, 0.0_dp, "less than a quarter of a period later")
     call b%drive%find_extremes(times)
     do k = 1, 2
-      call check_close(abs(b%drive%velocity_at(2, times(k)) - 1.0_dp), 2.0_dp*pi, 1.0e-14_dp, "velocity at an extreme")
+      call check_close(abs(b%drive%velocity_at(2, times(k), 0.01_dp) - 1.0_dp), 2.0_dp*pi, 1.0e-14_dp, "velocity at an extreme")
       call check(times(k) >= 0.0_dp .and. times(k) < 0.5_dp, "extremes of the first period")
     end do
     b%drive%velocity(2) = 0.0_dp
     b%drive%rotation_oscillation(3) = 0.1_dp
     call check(b%drive%turns() .and. b%drive%turns_about(3) .and. .not. b%drive%turns_about(1), "it turns about one axis")
-    call check_close(b%drive%spin_at(3, 0.1875_dp), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation")
+    call check_close(b%drive%spin_at(3, 0.1875_dp, 0.01_dp), -0.4_dp*pi, 1.0e-14_dp, "rate of rotation")
     b%drive%rotation_oscillation(3) = 0.0_dp
     low = 0.0_dp
     high = 0.0_dp
     do k = 1, steps
       ! velocities in the middle of steps
-      call b%prescribe(2, 0.5_dp*(k - 0.5_dp)/steps)
+      call b%prescribe(2, 0.5_dp*(k - 0.5_dp)/steps, 0.5_dp/steps)
       call b%move(0.5_dp/steps)
       call b%find_place(place)
       low = min(low, place(2))
@@ -424,9 +425,9 @@ contains
     call make_constants(b)
     b%surface%axis(:) = [0.0_dp, 0.6_dp, 0.8_dp]
     b%free(2) = .true.
-    call b%prescribe(3, 0.0_dp)
+    call b%prescribe(3, 0.0_dp, 0.1_dp)
     call check_vector(b%velocity, [11.0_dp, 0.0_dp, 13.0_dp], 0.0_dp, "prescribed components")
-    call b%applied_force(3, 0.0_dp, 0.5_dp, force)
+    call b%applied_force(3, 0.0_dp, 0.1_dp, 0.5_dp, force)
     call check_vector(force, [0.0_dp, 24.0_dp, 0.0_dp], 100*rounding, "force on the free component")
     b%free(:) = .false.
     b%drive%spin(:) = 0.0_dp

@@ -13,6 +13,8 @@ program test_time_table
   call test_values()
   call test_repeating()
   call test_one_row()
+  call test_means()
+  call test_means_of_cycles()
   call test_variation()
   call test_equal_rows()
   call test_turns()
@@ -103,20 +105,67 @@ contains
     call check_close(table%at(2, 9.0_dp), 5.0_dp, 0.0_dp, "one row, after")
   end subroutine test_one_row
 
-  !> The way of the first column.
-  subroutine check_way(step, theta, steps, missed, range, what)
-    real(dp), intent(in) :: step, theta, missed, range
-    integer, intent(in) :: steps
-    character(len=*), intent(in) :: what
-    real(dp) :: found(2)
+  !> Means between times that lie anywhere in a table; what they add up to is the integral.
+  subroutine test_means()
+    type(error_t), allocatable :: error
+    real(dp) :: sum, times(0:100)
+    integer :: k
 
-    call table%miss_way(1, step, theta, steps, found(1), found(2))
-    call check_close(found(1), missed, 1.0e-12_dp, what//", missed")
-    call check_close(found(2), range, 1.0e-12_dp, what//", range")
-  end subroutine check_way
+    call read_table("omega,time,vx"//newline//"8,1,-1"//newline//"4,3,-1"//newline//"12,3.5,-2"//newline, error)
+    call check(.not. allocated(error), "a table of means")
+    if (allocated(error)) return
+    call check_close(table%mean(3, 1.5_dp, 1.5_dp), 7.0_dp, 0.0_dp, "the mean of no time")
+    call check_close(table%mean(3, 1.25_dp, 1.75_dp), 7.0_dp, 0.0_dp, "between two rows the value in the middle")
+    call check_close(table%mean(3, 1.0_dp, 3.0_dp), 6.0_dp, 1.0e-15_dp, "from row to row")
+    call check_close(table%mean(3, -7.0_dp, 1.0_dp), 8.0_dp, 0.0_dp, "before the first row")
+    call check_close(table%mean(3, 3.5_dp, 1.0e9_dp), 12.0_dp, 0.0_dp, "after the last row")
+    call check_close(table%mean(3, 2.0_dp, 3.25_dp), 5.2_dp, 1.0e-14_dp, "over a row")
+    call check_close(table%mean(3, 0.0_dp, 3.0_dp), 20.0_dp/3.0_dp, 1.0e-14_dp, "over the first row")
+    call check_close(table%mean(3, 3.25_dp, 5.5_dp), 26.5_dp/2.25_dp, 1.0e-14_dp, "over the last row")
+    call check_close(table%mean(3, 0.0_dp, 5.5_dp), 48.0_dp/5.5_dp, 1.0e-14_dp, "over all rows")
+    call check_close(table%mean(1, 0.5_dp, 3.1_dp), -1.0_dp - 0.01_dp/2.6_dp, 1.0e-14_dp, "of another column")
+    call check_close(table%load_of(3, 3.25_dp, 1.25_dp), 5.2_dp, 1.0e-14_dp, "a load over its step")
+    call check_close(table%rate_at(3, 2.625_dp, 1.25_dp), 5.2_dp, 1.0e-14_dp, "a rate over half a step before and after")
+    call check_close(table%rate_at(3, 2.0_dp, 1.0_dp), table%at(3, 2.0_dp), 0.0_dp, "a rate where nothing turns")
+    times(:) = [(5.0_dp*k**2*1.0e-4_dp, k=0, 100)]
+    sum = 0.0_dp
+    do k = 1, 100
+      sum = sum + (times(k) - times(k - 1))*table%mean(3, times(k - 1), times(k))
+    end do
+    call check_close(sum, 42.0_dp, 1.0e-13_dp, "what means add up to")
+    call read_table("time,vx"//newline//"0,0"//newline//"1,4"//newline, error)
+    call check_close(table%rate_at(1, 0.0_dp, 0.5_dp), 0.5_dp, 1.0e-15_dp, "a rate at the start, of half a step")
+    call check_close(table%rate_at(1, 0.5_dp, 0.5_dp), 2.0_dp, 0.0_dp, "a rate after the start")
+    call check_close(table%load_of(1, 0.5_dp, 0.5_dp), 1.0_dp, 1.0e-15_dp, "the load of the first step")
+  end subroutine test_means
 
-  !> A triangle of period 2 that begins at 0: steps of 1/2 and 1 keep its ups and downs, those of 2 none of them, and those of 3/2 a
-  !> third of them. A jump between two steps is kept; what is behind the last step does not count.
+  !> Means of a table that begins anew, over its end and over whole cycles.
+  subroutine test_means_of_cycles()
+    type(error_t), allocatable :: error
+    integer :: k
+    logical :: same
+
+    call read_table("time,vx"//newline//"1,0"//newline//"2,4"//newline//"5,0"//newline, error, .true.)
+    call check(.not. allocated(error), "means of a table that repeats")
+    if (allocated(error)) return
+    call check_close(table%mean(1, 1.0_dp, 5.0_dp), 2.0_dp, 1.0e-15_dp, "a cycle")
+    call check_close(table%mean(1, 0.0_dp, 5.0_dp), 1.6_dp, 1.0e-15_dp, "a cycle and what was before it")
+    call check_close(table%mean(1, 4.5_dp, 5.5_dp), 2.0_dp/3.0_dp, 1.0e-14_dp, "the end of a cycle and the next one")
+    call check_close(table%mean(1, 4.5_dp, 45.5_dp), (2.0_dp/3.0_dp + 80.0_dp)/41.0_dp, 1.0e-13_dp, "many cycles and parts of two")
+    call check_close(table%mean(1, 1.0_dp, 4001.0_dp), 2.0_dp, 1.0e-13_dp, "a thousand cycles")
+    call check_close(table%mean(1, 4.0e6_dp + 1.5_dp, 4.0e6_dp + 2.5_dp), 10.0_dp/3.0_dp, 1.0e-8_dp, "after a million of cycles")
+    call read_table("time,vx"//newline//"0,-777.7"//newline//"0.7,-777.7"//newline//"1.1,-777.7"//newline, error, .true.)
+    call check(.not. allocated(error), "equal rows that repeat")
+    if (allocated(error)) return
+    same = .true.
+    do k = 0, 300
+      same = same .and. .not. abs(table%mean(1, 0.01_dp*k, 0.07_dp*k) + 777.7_dp) > 0.0_dp
+    end do
+    call check(same, "the mean over equal rows, without rounding")
+  end subroutine test_means_of_cycles
+
+  !> A triangle of period 2 from 0 to 6. The mean about a turn differs from it by a quarter of the step. Steps of the period keep
+  !> next to nothing, but at the ends. A jump within a step is kept; what is behind the last step does not count.
   subroutine test_variation()
     type(error_t), allocatable :: error
 
@@ -124,23 +173,24 @@ contains
       & newline//"5,1,1"//newline//"6,0,1"//newline, error)
     call check(.not. allocated(error), "a triangle")
     if (allocated(error)) return
-    call check_close(table%kept_variation(0.5_dp, 12), 1.0_dp, 1.0e-12_dp, "fine steps keep ups and downs")
-    call check_close(table%kept_variation(1.0_dp, 6), 1.0_dp, 1.0e-12_dp, "steps that are those of the rows do")
-    call check_close(table%kept_variation(2.0_dp, 3), 0.0_dp, 1.0e-12_dp, "steps of the period keep none")
-    ! 0, 1/2, 1, 1/2, 0
-    call check_close(table%kept_variation(1.5_dp, 4), 2.0_dp/6.0_dp, 1.0e-12_dp, "steps between keep a part")
-    call check_close(table%kept_variation(2.0_dp, 0), 1.0_dp, 1.0e-12_dp, "no step loses nothing")
-    call check_way(1.0_dp, 0.5_dp, 6, 0.0_dp, 3.0_dp, "steps that are those of the rows make the way of the table")
-    call check_way(2.0_dp, 0.5_dp, 3, 3.0_dp, 3.0_dp, "steps of the period make none")
-    ! 0, 1/2, 1 for times up to 3, and 1/2 more by the velocity at the end
-    call check_way(1.5_dp, 0.5_dp, 2, 0.0_dp, 1.5_dp, "steps between, whose errors cancel")
-    call check_way(1.5_dp, 1.0_dp, 2, 0.75_dp, 1.5_dp, "the velocity at the end of a step")
+    call check_close(table%kept_variation(3, 0.01_dp, 600), 5.975_dp/6.0_dp, 1.0e-12_dp, "fine steps keep ups and downs")
+    call check_close(table%kept_variation(3, 0.5_dp, 12), 4.75_dp/6.0_dp, 1.0e-12_dp, "half of the time between turns")
+    call check_close(table%kept_variation(3, 1.0_dp, 6), 3.5_dp/6.0_dp, 1.0e-12_dp, "the time between turns")
+    call check_close(table%kept_variation(3, 2.0_dp, 3), 1.0_dp/6.0_dp, 1.0e-12_dp, "steps of the period keep next to none")
+    call check_close(table%kept_variation(0, 0.5_dp, 12), 3.5_dp/6.0_dp, 1.0e-12_dp, "a load, half of the time between turns")
+    call check_close(table%kept_variation(0, 1.0_dp, 6), 1.0_dp/6.0_dp, 1.0e-12_dp, "a load, the time between turns")
+    call check_close(table%kept_variation(3, 2.0_dp, 0), 1.0_dp, 1.0e-12_dp, "no step loses nothing")
     call read_table("time,vx"//newline//"1.1,0"//newline//"1.2,3"//newline//"9,3"//newline//"9.1,0"//newline//"9.2,3"// &
       & newline, error)
     call check(.not. allocated(error), "a jump")
     if (allocated(error)) return
-    call check_close(table%kept_variation(0.5_dp, 8), 1.0_dp, 1.0e-12_dp, "a jump between two steps is kept")
-    call check_close(table%kept_variation(0.5_dp, 40), 1.0_dp/3.0_dp, 1.0e-12_dp, "a dip between two steps is not")
+    call check_close(table%kept_variation(3, 0.5_dp, 8), 1.0_dp, 1.0e-12_dp, "a jump within a step is kept")
+    call check_close(table%kept_variation(3, 0.5_dp, 40), 4.2_dp/9.0_dp, 1.0e-12_dp, "of a dip its mean is")
+    call read_table("time,vx"//newline//"0,0"//newline//"1,1"//newline//"2,0"//newline, error, .true.)
+    call check(.not. allocated(error), "a triangle that repeats")
+    if (allocated(error)) return
+    call check_close(table%kept_variation(0, 2.0_dp, 100), 1.0_dp/42.0_dp, 1.0e-12_dp, "a cycle in each step")
+    call check_close(table%kept_variation(0, 2.0_dp, 1), 0.5_dp, 1.0e-12_dp, "a cycle in the only step")
   end subroutine test_variation
 
   !> Between equal rows the value is theirs to the last bit, wherever it is asked for.
