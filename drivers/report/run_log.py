@@ -2,7 +2,7 @@
 import re
 
 import gravier
-from gravier.run_words import convergence, said_of, starts_of
+from gravier.run_words import convergence, doubts, said_of, starts_of
 
 #: exit statuses as the program documents them
 STATUSES = {0: "done, every solve converged", 3: "a solve did not converge", 4: "the run was interrupted, or an error ended it"}
@@ -20,6 +20,8 @@ class RunLog:
         self.restarts, self.lines, self._starts = len(starts) - 1, starts[-1], starts
         #: what the log says of convergence over all starts
         self.convergence = convergence(text)
+        #: what the last words of all starts doubt
+        self.doubts = doubts(text)
 
     def value(self, word):
         """What follows the last line that begins with a word; empty where there is none."""

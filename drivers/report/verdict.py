@@ -173,6 +173,12 @@ def too_fast(history):
                    "It may have passed through others.")]
 
 
+def doubted(log):
+    """What else the last words doubt: what has no question of its own."""
+    left = [part for part in log.doubts.split("; ") if part and not re.match(r"overlaps |\d+ times something moved|velocities were wrong", part)]
+    return [Answer("Do the last words doubt anything else?", DOUBT, f"Yes: {'; '.join(left)}.")] if left else []
+
+
 def balanced(log):
     said = log.value("energy")
     found = re.match(r"balance off by (\S+) J(?:; the sizes of its terms sum up to|, of) (\S+) J", said)
@@ -199,8 +205,8 @@ def answers(log, history, options, notes, solvers):
     """Answers to all questions of a run; `notes` name files that are missing or damaged, `solvers` are the first steps and the keys of &solver of its
     starts."""
     steps = (options.get("time") or [{}])[0].get("steps")
-    return [ended(log, history, steps), converged(log, history), accurate(log, history, solvers), projected(log, history), *too_fast(history), *balanced(log),
-            *readable(notes)]
+    return [ended(log, history, steps), converged(log, history), accurate(log, history, solvers), projected(log, history), *too_fast(history), *doubted(log),
+            *balanced(log), *readable(notes)]
 
 
 def headline(found, log):

@@ -327,7 +327,7 @@ module gravier_config_table
     [key_t("output", "directory", kind_text, "'results'", "not empty", "directory of the results"), &
      key_t("output", "every", kind_integer, "1", ">= 0", "steps between two written states; 0: the last state only"), &
      key_t("output", "history_every", kind_integer, "1", ">= 1", &
-           "steps between rows of `history.csv`, which also has the last step, steps with events and those of missed goals"), &
+           "steps between rows of `history.csv`, with the first and last step, those with events and missed goals"), &
      key_t("output", "contacts", kind_logical, ".true.", "", "write the contacts of each written state"), &
      key_t("output", "vtk", kind_logical, ".false.", "", &
            & "write `bodies.vtkhdf` and, with `contacts`, `contacts.vtkhdf` for ParaView, with each written state"), &

@@ -175,7 +175,7 @@ contains
         if (simulation%diagnostics%in_history(k)) call table%add(simulation%diagnostics%value(k))
       end do
       ! another row waits, since it may be that of the last step
-      if (mod(simulation%step, table%every) == 0 .or. counts_something(figures)) call table%end_row(error)
+      if (mod(simulation%step, table%every) == 0 .or. simulation%step == 1 .or. counts_something(figures)) call table%end_row(error)
     end associate
   end subroutine history_output_write
 

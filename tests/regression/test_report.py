@@ -187,6 +187,13 @@ class Report(RunTestCase):
         (answer,) = verdict.balanced(RunLog(2 * "Gravier 0.1.0 (a), dense\n" + "energy      balance off by 0.0 J; the sizes of its terms sum up to 1.0 J\n"))
         self.assertIn("since the last restart", answer.text)
 
+    def test_other_doubts(self):
+        """What the last words doubt and no other question asks for is marked; what is harmless or has its own question is not."""
+        log = "Gravier 0.1.0 (a), dense\nfinished    all 9 steps reached the accuracy; overlaps came to 0.3 of the mean radius; 2 grains had fallen below all boundaries; results in r\n"
+        (answer,) = verdict.doubted(RunLog(log))
+        self.assertEqual((answer.grade, answer.text), ("doubt", "Yes: 2 grains had fallen below all boundaries."))
+        self.assertEqual(verdict.doubted(RunLog(log.replace("2 grains had fallen below all boundaries; ", ""))), [])
+
     def test_rows_that_are_left_out(self):
         """The largest overlap and velocity error are those of the run, of all starts, where history.csv has other steps: the log has them."""
         history = gravier.results.Table(step=np.array([100]), max_overlap=np.array([1e-4]), projected=np.zeros(1), velocity_error=np.array([1e-3]),

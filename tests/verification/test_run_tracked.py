@@ -49,6 +49,23 @@ class Tracked(SmallScene):
             self.assertTrue(10 < np.argmax(gone) < STEPS and gone[np.argmax(gone):].all())
         self.both(check)
 
+    def test_cell_that_shears(self):
+        """A body that flies freely keeps its velocity and its way where it crosses the periods of a cell that shears, once the cell has begun."""
+        def check(dimension):
+            more = [0.25] * (dimension - 2)
+            velocity = [0.3, 4.0, *[0.1] * (dimension - 2)]
+            start = [0.5, 0.7, *more]
+            record = self.play(f"shears {dimension}", [Grain(start, velocity)], [], [0.0] * dimension, STEPS, scene={
+                "period": [PERIOD] * dimension, "cell_shear_rate": [2.0]}, output={"every": 0, "tracked_bodies": 1})
+            history = record.run.history()
+            self.assertGreater(history["body_y:1"][-1], 1.1 * PERIOD)
+            for name in "xyz"[:dimension]:
+                place, speed = history[f"body_{name}:1"], history[f"body_v{name}:1"]
+                self.verify(f"free body in a cell that shears, {dimension}D", f"v{name} [m/s]", speed, speed[0], 1e-12)
+                self.verify(f"free body in a cell that shears, {dimension}D", f"{name} [m]", place, place[0] + speed[0] * (history["time"] - history["time"][0]),
+                            1e-12)
+        self.both(check)
+
     def test_ranks_and_restart(self):
         """The same bits on two ranks, and where a run goes on from a checkpoint."""
         whole = self.fly("whole", 2).run.history()

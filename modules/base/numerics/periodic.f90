@@ -116,18 +116,21 @@ contains
     end do
   end subroutine add_edges
 
-  !> Move a place out of the cell by the periods that `wrap` has taken away.
-  pure subroutine period_unwrap(self, turns, x)
+  !> Move a place out of the cell by the periods that `wrap` has taken away, and give a velocity what they change by.
+  pure subroutine period_unwrap(self, turns, x, v)
     class(period_t), intent(in) :: self
     !> (nd): periods along each axis
     integer, intent(in) :: turns(:)
     !> (nd) [m]
     real(dp), intent(inout) :: x(:)
+    !> (nd) [m/s]
+    real(dp), intent(inout), optional :: v(:)
     integer :: shift(3)
 
     shift(:) = 0
     shift(1:size(turns)) = turns
     call add_edges(shift, self%length, self%tilt, x)
+    if (present(v)) call self%add_velocity(shift, v)
   end subroutine period_unwrap
 
   !> Shifts that bring a place of the cell to the cell or within `margin` of it, in ascending order; `margin` is less than half of

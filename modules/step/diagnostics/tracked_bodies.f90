@@ -166,8 +166,9 @@ contains
       associate (bodies => decomposition%owned(self%subdomain(b)), k => self%place(b), part => parts(:, self%subdomain(b)))
         first = (b - 1)*(n + 1)
         part(first + 1:first + self%nd) = bodies%position(:, k)
-        if (bodies%ni > 0) call decomposition%period%unwrap(bodies%image(:, k), part(first + 1:first + self%nd))
         part(first + self%nd + 1:first + n) = bodies%velocity(:, k)
+        if (bodies%ni > 0) call decomposition%period%unwrap(bodies%image(:, k), part(first + 1:first + self%nd), &
+          & part(first + self%nd + 1:first + 2*self%nd))
         part(first + n + 1) = merge(2.0_dp, 1.0_dp, bodies%glued(k) > 0)
       end associate
     end do
