@@ -23,7 +23,7 @@ STYLES = ["-", "--", ":", "-."]
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
          (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
-         (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
+         (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):|spin_[xyz]:", "rad/s"), (r"power:", "W"),
          (r"gravity_[xyz]", "m/s²"), (r"(gradient(_[xyz]{2})?|shear_rate|number_rate)$", "1/s"), (r"mass_rate$", "kg/s"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there
 PLACES = re.compile(r"(position|body)_[xyz]:|front_")

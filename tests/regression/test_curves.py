@@ -38,7 +38,8 @@ class Axes(unittest.TestCase):
     def test_labels(self):
         for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
                                        ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
-                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
+                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("power:drum", 2, "power:drum [W]"),
+                                       ("spin_z:drum", 3, "spin z:drum [rad/s]"), ("velocity_x:lid", 3, "velocity x:lid [m/s]"), ("energy_error", 2, "energy error [J]"),
                                        ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
                                        ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
                                        ("force_x:hard_work", 2, "force x:hard work [N]")):
