@@ -21,13 +21,13 @@ from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool,
 from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
-HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,",
+HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,(total_)?left,",
          "forces": b"step,time,contacts,normal_mean,", "fields": b"step,time,states,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
 #: what a file of fields begins with, by its ending
 IMAGES = {f".{ending}": rb'<\?xml version="1.0"\?>\n<VTKFile type="' + kind for ending, kind in (("vti", b"ImageData"), ("vts", b"StructuredGrid"))}
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
-         "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
+         "angle_low": "degrees", "angle_high": "degrees", "total_left": "grains", "total_left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
          "normal_mean": "N", "angle_c": "degrees", "angle_n": "degrees", "angle_t": "degrees"}
 
 

@@ -12,6 +12,7 @@ from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
 from gravier.measured import read_measured
+from gravier.outflows import FORMER, former_name
 from gravier.tables import Table
 
 #: early steps are light, late ones dark
@@ -22,7 +23,7 @@ STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
-         (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
+         (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|(total_)?left_mass", "kg"),
          (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):|spin_[xyz]:", "rad/s"), (r"power:", "W"),
          (r"gravity_[xyz]", "m/s²"), (r"(gradient(_[xyz]{2})?|shear_rate|number_rate)$", "1/s"), (r"mass_rate$", "kg/s"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there
@@ -248,6 +249,8 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv", win
         if len(history) == 0:
             raise PictureError(f"{run.directory / table}: no row; expected one at least")
         for name in [name for column in [*columns, against] for name in Curve(column, history).names]:
+            if name in FORMER and FORMER[name] in history:
+                raise PictureError(f"{run.directory / table}: {former_name(name)}")
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     histories = [rows_between((run, table), history, *window) for run, history in zip(runs, histories)]
