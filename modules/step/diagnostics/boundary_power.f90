@@ -71,8 +71,8 @@ contains
     self%spin(:, b) = boundary%spin(4 - size(self%spin, 1):3)
   end subroutine take_motion
 
-  !> Sum the works at the contacts, impulse times mean velocity of the boundary where it touches and moment times mean spin, the same
-  !> whatever the number of ranks. Collective.
+  !> Sum the works at the contacts, impulse times mean velocity of the boundary where it touches and moment times mean spin, the
+  !> same whatever the number of ranks. Collective.
   subroutine boundary_power_take_step(self, step)
     class(boundary_power_t), intent(inout) :: self
     type(solved_step_t), intent(in) :: step

@@ -43,8 +43,8 @@ contains
     end associate
   end subroutine find_mean_velocities
 
-  !> Impulse and moment that the boundary at a contact gives to the grain there, in the axes of the scene, and the column that stands
-  !> for the boundary.
+  !> Impulse and moment that the boundary at a contact gives to the grain there, in the axes of the scene, and the column that
+  !> stands for the boundary.
   subroutine find_push(problem, s, c, column, p, m)
     type(contact_problem_t), intent(in) :: problem
     !> subdomain and contact
