@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Measure what runs left in their directories, against time: mixing and segregation, heaps and collapses, tests between walls,
-discharge through outlets, contact forces and anisotropy; and fields on a grid: density, velocity, granular temperature, stress."""
+discharge through outlets, contact forces and anisotropy; fields on a grid: density, velocity, granular temperature, stress;
+and the sieve curve of a state or of a bodies file."""
 import sys
 from pathlib import Path
 
@@ -14,6 +15,7 @@ except ImportError as missing:
     sys.exit(f"gravier_measure: error: {missing}; expected a python3 with h5py and numpy (apt install python3-h5py)")
 from gravier.field_files import ending_of  # noqa: E402
 from gravier.force_networks import directions_of, distribution_of, networks, table_of  # noqa: E402
+from gravier.joined_bodies import opened_file  # noqa: E402
 from gravier.measured import write_measured  # noqa: E402
 from gravier.mixing import split_radius  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
@@ -21,19 +23,19 @@ from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool,
 from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
-HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,left,",
-         "forces": b"step,time,contacts,normal_mean,", "fields": b"step,time,states,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
+HEADS = {"mixing": b"step,time,mixing,", "heap": b"step,time,height,", "walls": b"step,time,axial_strain,", "outflow": b"step,time,(total_)?left,",
+         "forces": b"step,time,contacts,normal_mean,", "fields": b"step,time,states,", "sieve": b"size,passing,", "distribution": b"force,contacts,", "directions": b"angle,count,"}
 #: what a file of fields begins with, by its ending
 IMAGES = {f".{ending}": rb'<\?xml version="1.0"\?>\n<VTKFile type="' + kind for ending, kind in (("vti", b"ImageData"), ("vts", b"StructuredGrid"))}
 #: units of columns that have one; of stresses by the dimension
 UNITS = {"time": "s", "height_difference": "m", "height": "m", "front_low": "m", "front_high": "m", "length": "m", "angle": "degrees",
-         "angle_low": "degrees", "angle_high": "degrees", "left": "grains", "left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
+         "angle_low": "degrees", "angle_high": "degrees", "total_left": "grains", "total_left_mass": "kg", "number_rate": "1/s", "mass_rate": "kg/s",
          "normal_mean": "N", "angle_c": "degrees", "angle_n": "degrees", "angle_t": "degrees"}
 
 
 def parse(arguments):
     parser = OneLineParser(prog="gravier_measure", description=__doc__)
-    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow | forces | fields", parser_class=OneLineParser)
+    kinds = parser.add_subparsers(dest="kind", required=True, metavar="mixing | heap | walls | outflow | forces | fields | sieve", parser_class=OneLineParser)
     mixing = kinds.add_parser("mixing", help="Lacey's index and segregation of two kinds of grains, in each written state")
     mixing.add_argument("--by", default="size", metavar="WHAT", help="size, material, or x, y, z: where grains were at the start (size)")
     mixing.add_argument("--value", metavar="V", help="the first kind has radii above V [m] (middle of the radii), is of material V (the second), or began above V [m] "
@@ -64,15 +66,19 @@ def parse(arguments):
     fields.add_argument("--each", action="store_true", help="fields of each state by itself in the place of their mean")
     fields.add_argument("--vtk", type=Path, metavar="FILE", help="a file for ParaView, .vti, or .vts of a periodic cell that leans")
     fields.add_argument("--columns", metavar="A,B", help="of the picture (solid_fraction,velocity,granular_temperature,pressure,shear_ratio,inertial_number)")
+    sieve = kinds.add_parser("sieve", help="the part of the mass that passes a sieve against its size, D10, D50, D60 and C_u, of a state or of a bodies file")
+    sieve.add_argument("--step", type=whole(0), metavar="N", help="a written step (the last one)")
+    sieve.add_argument("--sieves", type=positive, nargs="+", metavar="SIZE", help="sizes of holes [m] (40 from the smallest body to the largest one)")
     for kind in (forces, fields):
         kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):
         kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     for kind in (mixing, heap, walls, outflow, forces, fields):
+        kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
+    for kind in (mixing, heap, walls, outflow, forces, fields, sieve):
         kind.add_argument("--plot", type=Path, metavar="FILE", help="a picture of what is measured, .png or .svg (needs matplotlib)")
         kind._negative_number_matcher = NEGATIVE
-        kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
-        kind.add_argument("directory", type=Path, metavar="DIR", help="output directory of a run")
+        kind.add_argument("directory", type=Path, metavar="DIR", help=f"output directory of a run{', or a bodies file, .h5 or .csv' if kind is sieve else ''}")
         kind.add_argument("--out", type=Path, metavar="FILE", help=f"the table, .csv ({kind.prog.split()[-1]}.csv in DIR)")
     return parser.parse_args(arguments)
 
@@ -82,6 +88,8 @@ def measure(run, options):
         return gravier.mixing(run, options.by, options.value, options.cell, options.since)
     if options.kind == "heap":
         return gravier.heap(run, options.along, options.shares, options.width, options.floor, options.since)
+    if options.kind == "sieve":
+        return gravier.sieve(run, options.step, options.sieves)
     if options.kind == "outflow":
         return gravier.outflow(run, options.mean, options.since)
     return gravier.wall_test(run, options.axial, options.lateral, options.mean, options.since)
@@ -140,6 +148,9 @@ def draw(options, run, tables, together):
             from picture_space import Walls
             walls = Walls(run, int(together[-1].step[0])) if run.dimension == 2 else None
             figure = draw_fields(together[-1], options.columns.split(",") if options.columns else None, walls)
+        elif options.kind == "sieve":
+            from sieve_picture import draw_sieve
+            figure = draw_sieve(tables["sieve"], gravier.sieve_sizes(run, options.step))
         else:
             from measure_pictures import draw_measured
             figure = draw_measured(options.kind, tables[options.kind], run.dimension)
@@ -167,6 +178,8 @@ def said(table, run, options, together=None):
     """The last row in words, of a test its strength, and of forces those of all states."""
     if options.kind == "fields":
         return said_of_fields(together)
+    if options.kind == "sieve":
+        return [", ".join(f"{name} {values[0]:.4g}{' m' if name.startswith('D') else ''}" for name, values in gravier.sieve_sizes(run, options.step).items())]
     lines = [f"last row: {in_words({name: values[-1] for name, values in table.items()}, run)}"]
     if options.kind == "mixing" and options.by == "size":
         limit, one_range = split_radius(run, options.value, options.since)
@@ -186,7 +199,8 @@ def said(table, run, options, together=None):
 
 def main(arguments=None):
     options = parse(arguments)
-    places = {options.kind: options.out or options.directory / f"{options.kind}.csv"}
+    of_file = options.kind == "sieve" and options.directory.suffix in (".h5", ".csv")
+    places = {options.kind: options.out or (options.directory.with_name(f"{options.directory.stem}_sieve.csv") if of_file else options.directory / f"{options.kind}.csv")}
     places.update({name: getattr(options, name, None) for name in ("distribution", "directions") if getattr(options, name, None)})
     for name, place in places.items():
         claim(place, {".csv": HEADS[name]})
@@ -196,7 +210,7 @@ def main(arguments=None):
         claim(options.vtk, IMAGES)
     together, images = None, {}
     try:
-        run = gravier.Run(options.directory)
+        run = opened_file(options.directory) if of_file else gravier.Run(options.directory)
         if options.kind == "forces":
             tables, together = measure_forces(run, options)
         elif options.kind == "fields":

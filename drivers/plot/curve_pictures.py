@@ -7,10 +7,13 @@ import numpy
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, to_rgb
 from matplotlib.ticker import FuncFormatter, MaxNLocator
+from one_line import plain
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
 from gravier.measured import read_measured
+from gravier.outflows import FORMER, former_name
+from gravier.tables import Table
 
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
@@ -20,8 +23,8 @@ STYLES = ["-", "--", ":", "-."]
 #: of the components of a profile, which are five at most
 PARTS = [*STYLES, (0, (7, 1.5, 1, 1.5, 1, 1.5))]
 UNITS = [(r"kinetic_|potential_energy|[a-z]+_work$|dissipated_|carried_away|energy_error|.*energy$", "J"), (r"time$|wall_seconds|solve_seconds", "s"),
-         (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|left_mass", "kg"),
-         (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):", "rad/s"),
+         (r"force_[xyz]:|force_mean|force_max|body_f[xyz]:", "N"), (r"moment_[xyz]:|body_m[xyz]:", "N m"), (r"(position|body)_[xyz]:|max_overlap|overlap_mean", "m"), (r"entered_mass|(total_)?left_mass", "kg"),
+         (r".*granular_temperature|temperature(_[xyz])?$", "m²/s²"), (r"velocity_error|velocity_scale|body_v[xyz]:|.*velocity_[xyz]|velocity$|speed$", "m/s"), (r"body_(omega|w[xyz]):|spin_[xyz]:", "rad/s"), (r"power:", "W"),
          (r"gravity_[xyz]", "m/s²"), (r"(gradient(_[xyz]{2})?|shear_rate|number_rate)$", "1/s"), (r"mass_rate$", "kg/s"), (r"(height_difference|height|front_low|front_high|length)$", "m"), (r"angle(_low|_high)?$", "degrees")]
 #: columns of places: their origin says nothing, so that their axes need not begin there
 PLACES = re.compile(r"(position|body)_[xyz]:|front_")
@@ -187,46 +190,70 @@ def fit_labels(figure, labels):
 
 
 class Curve:
-    """What a panel of a history shows: a column, its opposite `-A`, or a ratio `A/B` or `-A/B` of two columns. A name that is a column is that column."""
+    """What a panel of a history shows: a column, its opposite `-A`, a ratio `A/B` or a difference `A-B` of two columns, and opposites of the first columns of these. A name that
+    is a column is that column."""
 
     def __init__(self, text, known):
-        self.text, self.sign, self.below = text, 1.0, None
+        self.text, self.sign, self.between, self.other = text, 1.0, "", None
         if text not in known and text.startswith("-"):
             self.sign, text = -1.0, text[1:]
-        if text not in known and "/" in text:
-            text, self.below = text.split("/", 1)
-        self.above = text
-        self.names = [name for name in (self.above, self.below) if name is not None]
+        self.first = text
+        if text not in known:
+            # names of boundaries may have these signs
+            places = [sign.span() for sign in re.finditer("[/-]", text[:-1]) if sign.start() > 0]
+            places.sort(key=lambda place: (not (text[:place[0]] in known and text[place[1]:] in known), text[place[0]] == "-"))
+            if places:
+                self.first, self.between, self.other = text[:places[0][0]], text[places[0][0]], text[places[0][1]:]
+        self.names = [name for name in (self.first, self.other) if name is not None]
 
     def values(self, history):
-        """NaN where the ratio has none."""
-        values = self.sign * numpy.asarray(history[self.above], float) if self.sign < 0.0 else history[self.above]
-        if self.below is None:
+        """NaN where a ratio has none."""
+        values = self.sign * numpy.asarray(history[self.first], float) if self.sign < 0.0 else history[self.first]
+        if self.other is None:
             return values
-        below = numpy.asarray(history[self.below], float)
-        return numpy.divide(values, below, out=numpy.full(len(below), numpy.nan), where=below != 0.0)
+        other = numpy.asarray(history[self.other], float)
+        return values - other if self.between == "-" else numpy.divide(values, other, out=numpy.full(len(other), numpy.nan), where=other != 0.0)
 
     def label(self, dimensions):
         sign = "−" if self.sign < 0.0 else ""
-        if self.below is None:
-            return sign + label_of_all(self.above, dimensions)
-        (above, unit), (below, other) = (label_of_all(name, dimensions).removesuffix("]").split(" [") if " [" in label_of_all(name, dimensions)
-                                         else (label_of_all(name, dimensions), "") for name in self.names)
-        # a long name has two lines beside its panel
-        return f"{sign}{above} /{chr(10) if len(above + below) > 20 else ' '}{below}" + ("" if unit == other else f" [{unit or 1}{f'/({other})' if other else ''}]")
+        if self.other is None:
+            return sign + label_of_all(self.first, dimensions)
+        (first, unit), (last, other) = (label_of_all(name, dimensions).removesuffix("]").split(" [") if " [" in label_of_all(name, dimensions)
+                                        else (label_of_all(name, dimensions), "") for name in self.names)
+        words = f"{sign}{first} {'−' if self.between == '-' else '/'}{chr(10) if len(first + last) > 20 else ' '}{last}"
+        if self.between == "-":
+            if unit and other and unit != other:
+                raise PictureError(f"{plain(self.text)}: a difference of [{unit}] and [{other}]; expected columns of one unit")
+            return words + (f" [{unit or other}]" if unit or other else "")
+        return words + ("" if unit == other else f" [{unit or 1}{f'/({other})' if other else ''}]")
 
 
-def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
+def rows_between(run_and_table, history, since, until):
+    """The rows of a table whose times are after `since` and up to `until`, of which None is no limit."""
+    if since is None and until is None:
+        return history
+    low, high = -numpy.inf if since is None else since, numpy.inf if until is None else until
+    inside = (history["time"] > low) & (history["time"] <= high)
+    if not inside.any():
+        window = f"after {since:g} s" if until is None else f"up to {until:g} s" if since is None else f"after {since:g} s and up to {until:g} s"
+        raise PictureError(f"{run_and_table[0].directory / run_and_table[1]}: no row {window}; expected some of its times, {history['time'][0]:.6g} to {history['time'][-1]:.6g} s")
+    return Table({name: values[inside] for name, values in history.items()})
+
+
+def draw_history(runs, columns, against="time", rows=1, table="history.csv", window=(None, None)):
     """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
-    many rows. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told."""
+    many rows. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told. `window` is that of `rows_between`."""
     histories = [run.history() if table == "history.csv" else read_measured(run, table) for run in runs]
     columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
         if len(history) == 0:
             raise PictureError(f"{run.directory / table}: no row; expected one at least")
         for name in [name for column in [*columns, against] for name in Curve(column, history).names]:
+            if name in FORMER and FORMER[name] in history:
+                raise PictureError(f"{run.directory / table}: {former_name(name)}")
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
+    histories = [rows_between((run, table), history, *window) for run, history in zip(runs, histories)]
     if rows > 1:
         histories = [history.means(rows) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]
@@ -234,7 +261,7 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv"):
     curves = [Curve(column, histories[0]) for column in columns]
     along = Curve(against, histories[0])
     panels = [Panel(curve.label(dimensions), [(along.values(history), curve.values(history), name if k == 0 else None) for name, history in zip(names, histories)],
-                    counts=curve.text == "iterations", places=curve.below is None and bool(PLACES.match(curve.above)))
+                    counts=curve.text == "iterations", places=curve.other is None and bool(PLACES.match(curve.first)))
               for k, curve in enumerate(curves)]
     return draw_panels(panels, along=along.label(dimensions))
 

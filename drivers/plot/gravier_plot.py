@@ -17,7 +17,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from curve_pictures import draw_convergence, draw_history, draw_profile
 from movie_file import draw_movie
-from one_line import NEGATIVE, OneLineParser, run_tool, steps_of
+from one_line import NEGATIVE, OneLineParser, finite, run_tool, steps_of
 from packing_picture import COLOURS, draw_packing
 from picture_style import SETTINGS, PictureError, save_picture
 from whole_file import PICTURES, claim
@@ -58,9 +58,11 @@ def parse(arguments):
     packing.add_argument("--step", type=int, metavar="N", help="a step that results.h5 holds; the last one unless told")
     packing.add_argument("--dpi", type=int, default=200, metavar="N", help="of a PNG (200)")
     history = kinds.add_parser("history", parents=[several], help="columns of history.csv, or of a table of gravier_measure, against time or another column")
-    history.add_argument("--columns", metavar="A,B", help=f"{HISTORY} unless told, of another table all; -A changes the sign, A/B is a ratio")
-    # columns with a sign are no options
-    history._negative_number_matcher = re.compile(r"-[A-Za-z]")
+    history.add_argument("--columns", metavar="A,B", help=f"{HISTORY} unless told, of another table all; -A changes the sign, A/B is a ratio, A-B a difference")
+    # columns with a sign and numbers as -1e-3 are no options
+    history._negative_number_matcher = re.compile(f"-[A-Za-z]|{NEGATIVE.pattern}")
+    history.add_argument("--since", type=finite, metavar="T", help="draw the rows after this time alone [s]")
+    history.add_argument("--until", type=finite, metavar="T", help="draw the rows up to this time alone [s]")
     history.add_argument("--table", default="history.csv", metavar="FILE", help="another table in each DIR, such as mixing.csv of gravier_measure")
     history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps after each other in the place of single steps")
     history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain, or its opposite -COLUMN")
@@ -94,6 +96,8 @@ def check(options):
             refuse(f"--view {options.view[0]:g} {options.view[1]:g}: expected two numbers")
     if options.kind == "history" and options.mean < 1:
         refuse(f"--mean {options.mean}: expected 1 or more")
+    if options.kind == "history" and None not in (options.since, options.until) and options.since >= options.until:
+        refuse(f"--since {options.since:g} --until {options.until:g}: expected an end after the begin")
     if options.kind == "packing" and not 1 <= options.dpi <= 10000:
         refuse(f"--dpi {options.dpi}: expected 1 to 10000")
     if options.kind == "movie" or (options.kind == "packing" and (options.out is None or options.out.suffix != ".svg")):
@@ -125,7 +129,7 @@ def draw(options):
         figure = draw_packing(runs[0], options.step, options)
     elif options.kind == "history":
         columns = options.columns or (HISTORY if options.table == "history.csv" else "")
-        figure = draw_history(runs, columns.split(",") if columns else None, options.against, options.mean, options.table)
+        figure = draw_history(runs, columns.split(",") if columns else None, options.against, options.mean, options.table, (options.since, options.until))
     elif options.kind == "profile":
         figure = draw_profile(runs[0], options.region, options.steps, options.columns.split(","), options.mean)
     else:

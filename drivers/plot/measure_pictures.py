@@ -10,9 +10,9 @@ PANELS = {
                       ("angle", {"angle_low": "low flank", "angle_high": "high flank", "angle": None}, [])]),
     "walls": ("axial_strain", [("stress", {"axial_stress": "axial", "lateral_stress": "lateral"}, []), ("sin_phi", {"sin_phi": None}, []),
                                ("volumetric_strain", {"volumetric_strain": None}, []), ("void_ratio", {"void_ratio": None}, [])]),
-    "outflow": ("time", [("left_mass", {"left_mass": None}, []), ("mass_rate", {"mass_rate": None}, []), ("number_rate", {"number_rate": None}, [])])}
+    "outflow": ("time", [("total_left_mass", {"total_left_mass": None}, []), ("mass_rate", {"mass_rate": None}, []), ("number_rate", {"number_rate": None}, [])])}
 #: of panels with several columns, and of columns whose names say too little
-LABELS = {"front_low": "ends [m]", "length": "size [m]", "angle": "angle [degrees]", "mixing": "mixing M", "sin_phi": "sin φ", "run_out": "run-out", "number_rate": "grains a second [1/s]", "left_mass": "mass that has left [kg]",
+LABELS = {"front_low": "ends [m]", "length": "size [m]", "angle": "angle [degrees]", "mixing": "mixing M", "sin_phi": "sin φ", "run_out": "run-out", "number_rate": "grains a second [1/s]", "total_left_mass": "mass that has left [kg]",
           "mass_rate": "mass rate [kg/s]"}
 #: columns of places, whose axes need not begin at 0
 PLACES = ("front_low", "void_ratio")

@@ -29,10 +29,11 @@ module gravier_history_output
   end type history_output_t
 
   !> with which the history has columns more
-  type(csv_option_t), parameter :: column_options(9) = [csv_option_t("entered", "&insertion"), &
+  type(csv_option_t), parameter :: column_options(10) = [csv_option_t("entered", "&insertion"), &
     & csv_option_t("kinetic_translation", "&output energy"), csv_option_t("stress_", "&output stress"), &
     & csv_option_t("coordination", "&output structure"), &
     & csv_option_t("force_x:", "&output boundary_forces"), csv_option_t("moment_", "&output boundary_moments"), &
+    & csv_option_t("velocity_x:", "&output boundary_power"), &
     & csv_option_t("bonds", "&output bonds"), &
     & csv_option_t("body_", "&output tracked_bodies"), csv_option_t("body_f", "&output tracked_forces")]
 

@@ -1,5 +1,8 @@
 """Curves of gravier_plot: the limits and labels of axes, and the steps of a profile."""
+import contextlib
+import io
 import os
+import pathlib
 import sys
 import unittest
 from types import SimpleNamespace
@@ -35,7 +38,8 @@ class Axes(unittest.TestCase):
     def test_labels(self):
         for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
                                        ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
-                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("energy_error", 2, "energy error [J]"),
+                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("power:drum", 2, "power:drum [W]"),
+                                       ("spin_z:drum", 3, "spin z:drum [rad/s]"), ("velocity_x:lid", 3, "velocity x:lid [m/s]"), ("energy_error", 2, "energy error [J]"),
                                        ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
                                        ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
                                        ("force_x:hard_work", 2, "force x:hard work [N]")):
@@ -67,6 +71,35 @@ class Axes(unittest.TestCase):
             np.testing.assert_array_equal(curve.values(history), values, text)
             self.assertEqual(curve.label([3]), label)
         self.assertEqual(curve_pictures.Curve("-a/b", history).names, ["a", "b"])
+        # a difference; signs in names of boundaries are none where the names around another sign are columns
+        history["force_y:c-d"] = np.array([1.0, 5.0, 2.0])
+        for text, values, label in (("stress_yy-stress_xy", [1.0, 6.0, -3.0], "stress yy − stress xy [Pa]"), ("-stress_xy-stress_yy", [-3.0, -2.0, -3.0], "−stress xy − stress yy [Pa]"),
+                                    ("force_y:c-d-force_y:a/b-c", [0.0, 4.0, 1.0], "force y:c-d −\nforce y:a/b-c [N]"),
+                                    ("force_y:a/b-c/force_y:c-d", [1.0, 0.2, 0.5], "force y:a/b-c /\nforce y:c-d")):
+            curve = curve_pictures.Curve(text, history)
+            np.testing.assert_array_equal(curve.values(history), values, text)
+            self.assertEqual(curve.label([3]), label)
+        self.assertEqual(curve_pictures.Curve("a-b", history).names, ["a", "b"])
+        with self.assertRaisesRegex(curve_pictures.PictureError, r"kinetic_energy-stress_xy: a difference of \[J\] and \[Pa\]; expected columns of one unit"):
+            curve_pictures.Curve("kinetic_energy-stress_xy", history).label([3])
+
+    def test_window(self):
+        """Rows after a time and up to another one, before means are taken; a window without rows is named with the times that there are."""
+        times = np.arange(1, 11) / 10.0
+        run = SimpleNamespace(directory=pathlib.Path("run"), dimension=2, history=lambda: gravier.Table({"time": times, "contacts": 10.0 * times}))
+        for window, rows, drawn in (((None, None), 1, times), ((0.3, None), 1, times[3:]), ((None, 0.3), 1, times[:3]), ((0.2, 0.6), 1, times[2:6]), ((0.2, 0.6), 2, [0.35, 0.55])):
+            x, y = curve_pictures.draw_history([run], ["contacts"], rows=rows, window=window).axes[0].lines[0].get_data()
+            np.testing.assert_allclose(x, drawn, rtol=1e-14)
+            np.testing.assert_allclose(y, 10.0 * np.asarray(drawn), rtol=1e-14)
+        plt.close("all")
+        for window, words in (((1.0, None), "no row after 1 s"), ((None, 0.05), "no row up to 0.05 s"), ((0.31, 0.39), "no row after 0.31 s and up to 0.39 s")):
+            with self.assertRaisesRegex(curve_pictures.PictureError, f"run/history.csv: {words}; expected some of its times, 0.1 to 1 s"):
+                curve_pictures.draw_history([run], ["contacts"], window=window)
+        options = gravier_plot.parse(["history", "run", "--since", "-1e-3", "--until", "2", "--columns", "-a"])
+        self.assertEqual((options.since, options.until, options.columns), (-1e-3, 2.0, "-a"))
+        with self.assertRaises(SystemExit), contextlib.redirect_stderr(io.StringIO()) as said:
+            gravier_plot.check(gravier_plot.parse(["history", "run", "--since", "2", "--until", "1"]))
+        self.assertEqual(said.getvalue(), "gravier_plot: --since 2 --until 1: expected an end after the begin\n")
         self.assertEqual(gravier_plot.parse(["history", "run", "--columns", "-stress_xy/stress_yy,contacts"]).columns, "-stress_xy/stress_yy,contacts")
 
     def test_from_zero(self):

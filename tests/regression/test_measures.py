@@ -483,21 +483,40 @@ class Command(RunTestCase):
             np.testing.assert_allclose(found.time, 1e-3 * ends, rtol=1e-12)
             number = np.array([((step > first) & (step <= end)).sum() for end in ends])
             total = np.array([mass[(step > first) & (step <= end)].sum() for end in ends])
-            self.assertLessEqual(np.abs(found.left - number).max(), int(mean == 1), "a disk that is at the outlet within rounding may leave a step later")
+            self.assertLessEqual(np.abs(found.total_left - number).max(), int(mean == 1), "a disk that is at the outlet within rounding may leave a step later")
             if mean > 1:
-                np.testing.assert_allclose(found.left_mass, total, rtol=1e-12)
+                np.testing.assert_allclose(found.total_left_mass, total, rtol=1e-12)
                 np.testing.assert_allclose(found.mass_rate, np.diff(total, prepend=0.0) / (mean * 1e-3), rtol=1e-12)
                 np.testing.assert_allclose(found.number_rate, np.diff(number, prepend=0) / (mean * 1e-3), rtol=1e-12)
-        self.assertEqual(gravier.outflow(run, 400).left[-1], 10)
+        self.assertEqual(gravier.outflow(run, 400).total_left[-1], 10)
+        # names of earlier versions are refused with the new ones
+        for name in ("left", "left_mass"):
+            words = f"column {name} of an outflow is now total_{name}; {name} is that of single steps, in history.csv"
+            with self.assertRaisesRegex(AttributeError, words):
+                getattr(gravier.outflow(run, 400), name)
+            with self.assertRaisesRegex(KeyError, words):
+                gravier.outflow(run, 400)[name]
         for options, words in (({"mean": 0}, "mean 0: expected a whole number of steps above 0"), ({"mean": 401}, "400 steps after 0 s; expected 401 at least"),
                                ({"since": 0.4}, "0 steps after 0.4 s; expected 1 at least")):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.outflow(run, **options)
         done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertEqual(done.stdout, f"last row: time 0.4 s, left 10 grains, left mass {mass.sum():.4g} kg, number rate 25 1/s, mass rate "
+        self.assertEqual(done.stdout, f"last row: time 0.4 s, total left 10 grains, total left mass {mass.sum():.4g} kg, number rate 25 1/s, mass rate "
                                       f"{mass.sum() / 0.4:.4g} kg/s\nout/outflow.csv\n")
-        np.testing.assert_allclose(gravier.read_table(self.here("out/outflow.csv")).left_mass, [mass.sum()], rtol=1e-8)
+        np.testing.assert_allclose(gravier.read_table(self.here("out/outflow.csv")).total_left_mass, [mass.sum()], rtol=1e-8)
+        plot = os.path.join(SOURCE, "drivers/plot/gravier_plot.py")
+        done = script(plot, "history", "out", "--table", "outflow.csv", "--columns", "left_mass", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual((done.returncode, done.stderr), (2, "gravier_plot: out/outflow.csv: column left_mass of an outflow is now total_left_mass; left_mass is that of single steps, in history.csv\n"))
+        # a table of an earlier version is not drawn, and is written anew
+        with open(self.here("out/outflow.csv")) as file:
+            text = file.read()
+        with open(self.here("out/outflow.csv"), "w") as file:
+            file.write(text.replace("total_", ""))
+        done = script(plot, "history", "out", "--table", "outflow.csv", "--columns", "left_mass", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertIn("out/outflow.csv: column left_mass of an outflow is now total_left_mass", done.stderr)
+        done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
 
     def test_pictures(self):
         """Columns of a table that have numbers, or those that are told, have a panel each."""
@@ -517,7 +536,7 @@ class Command(RunTestCase):
     def test_pictures_of_tables(self):
         """Each kind of table has a picture with a panel for each measure, with its unit; curves that a table does not have are left out. The command draws it."""
         run = gravier.Run(os.path.join(self.directory, "results"))
-        rows = {name: np.linspace(0.1, 0.2, 5) for name in ("step", "time", "axial_strain", "volumetric_strain", "void_ratio", "axial_stress", "lateral_stress", "sin_phi", "left_mass", "mass_rate",
+        rows = {name: np.linspace(0.1, 0.2, 5) for name in ("step", "time", "axial_strain", "volumetric_strain", "void_ratio", "axial_stress", "lateral_stress", "sin_phi", "total_left_mass", "mass_rate",
                                                              "number_rate", "height", "length", "run_out", "angle")}
         for kind, table, dimension, labels, lines in (
                 ("heap", gravier.heap(run), 2, ["ends [m]", "size [m]", "run-out", "angle [degrees]"], [2, 2, 1, 2]), ("heap", gravier.Table(rows), 3, ["size [m]", "run-out", "angle [degrees]"], [2, 1, 1]),

@@ -15,7 +15,7 @@ from gravier_runs import LONG, RunTestCase, differences, gravier, merged, nameli
 G = 9.81
 RADIUS = 0.01
 MASS = 0.5
-ALL = {"output": {"energy": True, "stress": True, "structure": True, "boundary_forces": True}}
+ALL = {"output": {"energy": True, "stress": True, "structure": True, "boundary_forces": True, "boundary_power": True}}
 
 
 def grains_csv(path, positions, velocities=None, radii=None):
@@ -515,6 +515,7 @@ class Diagnostics(RunTestCase):
         self.run_here("restarted", merged(case, {"time": {"steps": 30}}), boundaries)
         again = self.run_here("restarted", merged(case, {"time": {"steps": 60}}), boundaries, 2, options=["--restart"])
         history = again.history()
+        self.assertGreater(np.abs(history["power:lid"]).max(), 0.0)
         for name, values in whole.history().items():
             if not name.endswith("_seconds"):
                 np.testing.assert_array_equal(history[name], values, name)
@@ -526,7 +527,7 @@ class Diagnostics(RunTestCase):
         plain = self.run_here("plain", case, boundaries)
         columns = len(plain.history())
         self.assertFalse([name for name in plain.results() if "diagnostics" in name])
-        more = {"energy": 10, "stress": 7, "structure": 13, "boundary_forces": 4 * len(boundaries), "boundary_moments": len(boundaries)}
+        more = {"energy": 10, "stress": 7, "structure": 13, "boundary_forces": 4 * len(boundaries), "boundary_moments": len(boundaries), "boundary_power": 4 * len(boundaries)}
         for group, count in more.items():
             run = self.run_here(group, merged(case, {"output": {group: True}}), boundaries)
             history, results = run.history(), run.results()

@@ -21,11 +21,12 @@ from .restarts import write_bodies
 from .results import BodiesFile, Run
 from .rough_walls import rough_walls
 from .shapes import Piece, Shape
+from .sieves import sieve, sieve_sizes
 from .simulation import Simulation
 from .studies import study
 from .tables import ResultsError, Table, read_table, write_table
 from .wall_tests import wall_test
 
 __all__ = ["BodiesFile", "CaseError", "Fields", "Piece", "ResultsError", "Run", "Shape", "Simulation", "SimulationError", "StaleArray", "Table", "blocks",
-           "contact_forces", "entries", "fields", "fields_of_states", "force_directions", "force_distribution", "heap", "join_bodies", "mixing", "namelist", "outflow", "parse_namelist", "read_table", "rough_walls", "run", "seal", "study",
+           "contact_forces", "entries", "fields", "fields_of_states", "force_directions", "force_distribution", "heap", "join_bodies", "mixing", "namelist", "outflow", "parse_namelist", "read_table", "rough_walls", "run", "seal", "sieve", "sieve_sizes", "study",
            "value_text", "wall_test", "write_bodies", "write_table"]

@@ -121,7 +121,7 @@ def _check_round(run, steps):
         bodies = free_grains(run, step)
         if len(bodies) == 0:
             continue
-        mean = _sizes(run, bodies).mean()
+        mean = radii_of(run, bodies).mean()
         filled = [breadth > 0.0 and _breadth(bodies.position[:, axis], mean) > FILLED * breadth for axis, (breadth, _) in enumerate(sides)]
         if sum(filled) == 1:
             axis = filled.index(True)
@@ -144,7 +144,7 @@ def _sides(run, axis):
     return min(facing[False]) - max(facing[True]), f"the breadth between two walls along {name}"
 
 
-def _sizes(run, bodies):
+def radii_of(run, bodies):
     """Radii of grains; of shapes those of balls as large."""
     return (run.volumes(bodies) / ball(run.dimension).volume)**(1.0 / run.dimension)
 
@@ -152,7 +152,7 @@ def _sizes(run, bodies):
 def _measure(run, bodies, along, how):
     """The row of a state with grains."""
     width, floor, shares = how
-    size = _sizes(run, bodies)
+    size = radii_of(run, bodies)
     mean = size.mean()
     width = 4.0 * mean if width is None else width
     position, axis = bodies.position, "xy".index(along or "x")

@@ -28,7 +28,7 @@ def join_bodies(files, path, shift=None, above=None, overlap=None, density=None)
 
     Returns a table with a row a file: file, first and last number of its bodies, walls and forces that are left out, and near, the number of pairs of
     enclosing balls that meet where one of the two bodies has a shape."""
-    read = [_opened(one) for one in files]
+    read = [opened_file(one) for one in files]
     if len(read) < 2:
         raise ResultsError(f"{len(read)} bodies files; expected two at least")
     claim_bodies_file(path, PROGRAM, *(one.path for one in read))
@@ -52,7 +52,8 @@ def join_bodies(files, path, shift=None, above=None, overlap=None, density=None)
     return Table({name: np.array(values) for name, values in zip(("file", "first", "last", "walls", "forces", "near"), zip(*rows))})
 
 
-def _opened(path):
+def opened_file(path):
+    """A bodies file, .h5 or .csv, to be read."""
     return path if isinstance(path, BodiesFile) else BodiesTable(Path(path)) if Path(path).suffix == ".csv" else BodiesFile(path)
 
 

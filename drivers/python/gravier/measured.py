@@ -4,6 +4,7 @@ import zlib
 import h5py
 import numpy as np
 
+from .outflows import former_name
 from .tables import ResultsError, Table, read_table, write_table
 
 #: the column, behind the others
@@ -41,6 +42,8 @@ def read_measured(run, name):
     path = run.directory / name
     table = read_table(path, ("time",))
     number = table.pop(COLUMN, None)
+    if "left_mass" in table and "mass_rate" in table:
+        raise ResultsError(f"{path}: {former_name('left_mass')}; expected the table of gravier_measure outflow of this version")
     if number is not None and len(number) > 0 and "step" in table and number[-1] != run_checksum(run, table.step.max()):
         raise ResultsError(f"{path}: measured from another run than the one whose results are in {run.directory}; expected a table of this run, which gravier_measure makes "
                            "anew")

@@ -3,9 +3,29 @@ import numpy as np
 
 from .tables import ResultsError, Table
 
+#: columns that had other names before, in the table of what has left
+FORMER = {"left": "total_left", "left_mass": "total_left_mass"}
+
+
+def former_name(name):
+    """What is said of a name that a column of an outflow had before."""
+    return f"column {name} of an outflow is now {FORMER[name]}; {name} is that of single steps, in history.csv"
+
+
+class Outflow(Table):
+    """The table of `outflow`. Names of columns of earlier versions, which history.csv has for single steps, are refused with the new ones."""
+
+    def __getattr__(self, name):
+        if name in FORMER:
+            raise AttributeError(former_name(name))
+        return super().__getattr__(name)
+
+    def __missing__(self, name):
+        raise KeyError(former_name(name) if name in FORMER else name)
+
 
 def outflow(run, mean=1, since=0.0):
-    """What has left through outlets, from history.csv: a row for `mean` steps after each other, with step and time of their end, left and left_mass, the
+    """What has left through outlets, from history.csv: a row for `mean` steps after each other, with step and time of their end, total_left and total_left_mass, the
     number and the mass [kg] of the grains that have left since the time `since` [s], number_rate [1/s] and mass_rate [kg/s] over these steps. Rows behind
     the last whole block are left out. In the plane masses are those of a length of 1 m."""
     if not isinstance(mean, (int, np.integer)) or mean < 1:
@@ -18,10 +38,10 @@ def outflow(run, mean=1, since=0.0):
     if len(rows) < mean:
         raise ResultsError(f"{run.directory}/history.csv: {len(rows)} steps after {since:g} s; expected {mean} at least")
     last = np.arange(mean - 1, len(rows), mean)
-    found = {"step": rows.step[last], "time": rows.time[last], "left": np.cumsum(rows.left)[last], "left_mass": np.cumsum(rows.left_mass)[last]}
-    for rate, total in (("number_rate", "left"), ("mass_rate", "left_mass")):
+    found = {"step": rows.step[last], "time": rows.time[last], "total_left": np.cumsum(rows.left)[last], "total_left_mass": np.cumsum(rows.left_mass)[last]}
+    for rate, total in (("number_rate", "total_left"), ("mass_rate", "total_left_mass")):
         found[rate] = np.diff(found[total], prepend=0.0) / np.diff(found["time"], prepend=_begin(run, history, since))
-    return Table(found)
+    return Outflow(found)
 
 
 def _begin(run, history, since):

@@ -5,8 +5,8 @@ module gravier_energy_balance
   use gravier_boundary, only: boundary_t
   use gravier_body_store, only: body_set_t
   use gravier_body_figures, only: body_figures_t
-  use gravier_contact_kernels, only: kernels_t, contact_arms, global_moment, lanes, n_blocks, lane_of, block_of
-  use gravier_subproblem, only: subproblem_t
+  use gravier_contact_kernels, only: lanes, n_blocks, lane_of, block_of
+  use gravier_boundary_push, only: find_earlier, find_mean_velocities, find_push
   use gravier_cell_response, only: image_velocity
   use gravier_decomposition, only: decomposition_t
   use gravier_halo, only: local_bodies_t
@@ -157,13 +157,9 @@ contains
     type(solved_step_t), intent(in) :: step
     type(boundary_t) :: earlier(size(step%decomposition%boundaries))
     real(dp) :: parts(n_sums, size(step%problem%sub)), sums(n_sums), springs(2, 2)
-    integer :: s, b
+    integer :: s
 
-    do b = 1, size(earlier)
-      earlier(b) = step%decomposition%boundaries(b)
-      earlier(b)%velocity(:) = earlier(b)%last_velocity
-      earlier(b)%spin(:) = earlier(b)%last_spin
-    end do
+    call find_earlier(step, earlier)
     parts(:, :) = 0.0_dp
     do s = 1, size(step%problem%sub)
       call add_grains(step%halo%view(s), step%decomposition, s, step%physics, parts(:, s))
@@ -248,8 +244,7 @@ contains
 
     associate (sub => step%problem%sub(s), kernels => step%problem%kernels)
       allocate (mean(kernels%nv, sub%n_columns), v(lanes, kernels%nc, n_blocks(sub%n_contacts)))
-      call find_start(step, step%halo%view(s), sub, earlier, mean)
-      mean(:, :) = 0.5_dp*(mean + sub%v_global)
+      call find_mean_velocities(step, s, earlier, mean)
       call sub%contact_velocity(kernels, mean, v)
       do c = 1, sub%n_contacts
         q = lane_of(c)
@@ -289,98 +284,16 @@ contains
       real(dp) :: p(step%problem%nd), m(step%problem%nv - step%problem%nd)
       integer :: column, d
 
-      associate (problem => step%problem, sub => step%problem%sub(s))
-        call problem%impulse_on_candidate(s, c, p)
-        column = sub%pair(2, c)
-        if (sub%pair(1, c) > sub%n_grains) then
-          column = sub%pair(1, c)
-          p(:) = -p
-        end if
-        do d = 1, size(p)
+      call find_push(step%problem, s, c, column, p, m)
+      associate (nd => step%problem%nd, sub => step%problem%sub(s))
+        do d = 1, nd
           if (.not. earlier(sub%boundary(column))%free(d)) part(in_boundary) = part(in_boundary) + p(d)*mean(d, column)
         end do
-        if (.not. problem%has_rolling()) return
-        call global_moment(problem%kernels, sub%hot, sub%impulse, c, m)
-        if (sub%pair(1, c) > sub%n_grains) m(:) = -m
-        part(in_boundary) = part(in_boundary) + sum(m*mean(problem%nd + 1:, column))
+        if (step%problem%has_rolling()) part(in_boundary) = part(in_boundary) + sum(m*mean(nd + 1:, column))
       end associate
     end subroutine add_boundary_work
 
   end subroutine add_contacts
-
-  !> Velocities of the columns of a subproblem at the start of the step; spins as they are at its end without moments, which have
-  !> the same energy.
-  subroutine find_start(step, view, sub, earlier, start)
-    type(solved_step_t), intent(in) :: step
-    type(local_bodies_t), intent(in) :: view
-    type(subproblem_t), intent(in) :: sub
-    type(boundary_t), intent(in) :: earlier(:)
-    !> (nv, n_columns)
-    real(dp), intent(out), contiguous :: start(:, :)
-    integer :: c, i, j, nd
-
-    nd = step%problem%nd
-    start(:, :) = 0.0_dp
-    do c = 1, sub%n_contacts
-      call view%find_ends(sub%source(c), i, j)
-      call fill(sub%pair(1, c), i)
-      call fill(sub%pair(2, c), j)
-    end do
-
-  contains
-
-    !> A column that stands for grain `k` of the view, or for a boundary.
-    subroutine fill(column, k)
-      integer, intent(in) :: column, k
-      real(dp) :: point(nd), now(nd)
-
-      if (column <= sub%n_grains) then
-        start(:, column) = view%bodies%velocity(1:size(start, 1), k)
-        call step%decomposition%figures%turn_freely(view%bodies, k, step%physics%h, start(:, column))
-        return
-      end if
-      call find_touched_point(step%problem%kernels, view, sub, c, k, point)
-      call earlier(sub%boundary(column))%velocity_at(point, start(1:nd, column))
-      ! what the end of the step has of the travel of the body (add_travel), its start lacks
-      if (earlier(sub%boundary(column))%drive%turns()) then
-        call step%decomposition%boundaries(sub%boundary(column))%velocity_at(point, now)
-        start(1:nd, column) = start(1:nd, column) - (sub%v_global(1:nd, column) - now)
-      end if
-      start(nd + 1:, column) = earlier(sub%boundary(column))%spin(merge(3, 1, nd == 2):size(start, 1) - nd + merge(2, 0, nd == 2))
-    end subroutine fill
-
-  end subroutine find_start
-
-  !> Where a free grain touches boundary -k, or grain `k` that is part of one, at contact `c`.
-  pure subroutine find_touched_point(kernels, view, sub, c, k, point)
-    type(kernels_t), intent(in) :: kernels
-    type(local_bodies_t), intent(in) :: view
-    type(subproblem_t), intent(in) :: sub
-    integer, intent(in) :: c, k
-    !> (nd) [m]
-    real(dp), intent(out) :: point(:)
-    real(dp), dimension(size(point)) :: normal, arm_i, arm_j
-    integer :: i, j
-
-    call view%find_ends(sub%source(c), i, j)
-    associate (bodies => view%bodies)
-      normal(:) = sub%hot(lane_of(c), 1:size(point), block_of(c))
-      if (kernels%has_shapes()) then
-        call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
-        if (k == i) then
-          point(:) = bodies%position(:, j) + arm_j
-        else
-          point(:) = bodies%position(:, i) + arm_i
-        end if
-      else if (k < 0) then
-        point(:) = bodies%position(:, i) - (bodies%radius(i) + sub%gap(c))*normal
-      else if (k == i) then
-        point(:) = bodies%position(:, i) - bodies%radius(i)*normal
-      else
-        point(:) = bodies%position(:, j) + bodies%radius(j)*normal
-      end if
-    end associate
-  end subroutine find_touched_point
 
   !> Energies of the boundaries that forces move, and the work of these forces.
   pure subroutine take_boundaries(self, boundaries, impulses)
