@@ -1,6 +1,7 @@
 """Command lines whose errors are one line, as those of the programs, and tools that end in an orderly way."""
 import argparse
 import math
+import os
 import re
 import signal
 import sys
@@ -75,9 +76,13 @@ def steps_of(text):
 
 def run_tool(main):
     """Run a tool and exit with the status that `main` returns. SIGTERM ends it as sys.exit does, with status 143, so that it takes its drafts
-    away; ^C ends it with 130, without a traceback."""
+    away; ^C ends it with 130, and a reader of its output who has seen enough, as `head`, with 141: both without a traceback."""
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     try:
         sys.exit(main())
     except KeyboardInterrupt:
         sys.exit(128 + signal.SIGINT)
+    except BrokenPipeError:
+        # what is left to write goes nowhere, at the end of the interpreter as well
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(128 + signal.SIGPIPE)

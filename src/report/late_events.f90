@@ -1,12 +1,13 @@
 !> What the log says of events that have their time: boundaries that are removed, and those that a run ends before, insertions that
-!> begin and boundaries that are removed only after its end, and grains that have fallen below all boundaries.
+!> begin and boundaries that are removed only after its end, grains that have fallen below all boundaries, and forces to start from.
 module gravier_late_events
-  use gravier_kinds, only: dp
+  use gravier_kinds, only: dp, i8
   use gravier_text, only: to_text, counted
+  use gravier_given_impulses, only: started_t
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: late_warnings, removal_lines, fallen_warning
+  public :: late_warnings, removal_lines, fallen_warning, forces_line
 
   character(len=*), parameter :: newline = new_line("a")
   !> part of a step that roundings of times take
@@ -55,6 +56,22 @@ contains
     end subroutine warn
 
   end subroutine late_warnings
+
+  !> What a run started from where the bodies file gives contacts with forces.
+  function forces_line(started, yields) result(text)
+    type(started_t), intent(in) :: started
+    !> some contacts have springs, whose forces follow from their overlaps
+    logical, intent(in) :: yields
+    character(len=:), allocatable :: text
+    integer(i8) :: per_mille
+
+    ! rounded down, so that 100.0 are all
+    per_mille = int(1000.0_dp*started%share*(1.0_dp + epsilon(1.0_dp)), i8)
+    text = "start       from forces of the bodies file: "//to_text(started%matched)//" of its "//to_text(started%given)// &
+      & " contacts touch in the first step, with "//to_text(per_mille/10)//"."//to_text(mod(per_mille, 10_i8))// &
+      & " % of its normal forces"
+    if (yields) text = text//"; springs press by their overlaps"
+  end function forces_line
 
   !> The boundaries that were removed at the start of the last step, each a line ended by a newline.
   function removal_lines(simulation) result(text)

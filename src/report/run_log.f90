@@ -21,7 +21,7 @@ module gravier_run_log
   use gravier_inflow_lines, only: inflow_warnings, entering_lines, population_lines
   use gravier_cell_lines, only: cell_strain_lines
   use gravier_region_lines, only: region_warnings
-  use gravier_late_events, only: late_warnings, removal_lines, fallen_warning
+  use gravier_late_events, only: late_warnings, removal_lines, fallen_warning, forces_line
   use gravier_rounding_lines, only: rounding_warnings
   use gravier_sample_lines, only: sample_warnings
   use gravier_intact_bonds, only: count_bonds
@@ -226,21 +226,14 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(step_figures_t), intent(in) :: figures
     type(error_t), allocatable, intent(inout) :: error
-    integer(i8) :: per_mille, bonds
+    integer(i8) :: bonds
 
     call write_lines(self, removal_lines(simulation), "", error)
     if (simulation%step == 1 .and. simulation%physics%laws%breaks) then
       bonds = count_bonds(simulation%halo, simulation%decomposition, simulation%physics%laws)
       call self%line("bonds       "//to_text(bonds)//" after the first step", error)
     end if
-    associate (started => figures%started)
-      if (started%given == 0) return
-      ! rounded down, so that 100.0 are all
-      per_mille = int(1000.0_dp*started%share*(1.0_dp + epsilon(1.0_dp)), i8)
-      call self%line("start       from forces of the bodies file: "//to_text(started%matched)//" of its "// &
-        & to_text(started%given)//" contacts touch in the first step, with "//to_text(per_mille/10)//"."// &
-        & to_text(mod(per_mille, 10_i8))//" % of its normal forces", error)
-    end associate
+    if (figures%started%given > 0) call self%line(forces_line(figures%started, simulation%physics%laws%yields), error)
   end subroutine run_log_write_events
 
   !> Contacts and interface as the partition makes them now.

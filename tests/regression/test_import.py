@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from forked_scripts import script
-from gravier_runs import ENVIRONMENT, PROGRAMS, RunTestCase, alone_environment, gravier, namelist, write
+from gravier_runs import ENVIRONMENT, PROGRAMS, SOURCE, RunTestCase, alone_environment, gravier, namelist, write
 
 IMPORT = os.path.join(PROGRAMS, "gravier_import")
 G = 9.81
@@ -167,6 +167,17 @@ class Import(RunTestCase):
                 said = tool.communicate()[1]
             self.assertEqual((tool.returncode, said), (status, ""))
             self.assertEqual(sorted(name for name in os.listdir(folder) if "started" not in name), ["slow.sh"])
+
+    def test_reader_that_ends(self):
+        """A tool whose output nobody reads to its end says nothing of it, whether it notes so while it writes or at its end."""
+        tool = "import sys; sys.path.insert(0, {!r})\nfrom one_line import run_tool\ndef main():\n    print('x' * {})\n    return 0\nrun_tool(main)\n"
+        for size in (10, 10**6):
+            code = tool.format(os.path.join(SOURCE, "drivers/python"), size)
+            with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as writer:
+                writer.stdout.close()
+                said = writer.stderr.read()
+                writer.stderr.close()
+                self.assertEqual((writer.wait(), said), (141, ""), size)
 
     def test_a_settled_packing_stays_settled(self):
         """300 disks at rest, as LMGC90 would have written them (reference places and displacements, walls that are rectangles with

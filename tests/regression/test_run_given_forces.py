@@ -127,6 +127,7 @@ class GivenForces(RunTestCase):
                     size = np.linalg.norm(found[f"/steps/{steps}/contacts/impulse"][:, 1:], axis=1)
                     np.testing.assert_allclose(size, abs(part) * bodies["mass"][0] * G * STEP, rtol=1e-5)
                     history = rested.history()
+                    self.assertIn("% of its normal forces; springs press by their overlaps", rested.stdout)
                     stored = history["elastic_energy"][-1]
                     self.assertGreater(stored, 0.0)
                     for column in ("dissipated_normal", "dissipated_friction", "energy_error"):
