@@ -310,6 +310,7 @@ contains
 
     report%instance = 1
     associate (scene => config%scene, parts => config%decomposition, sample => config%sample)
+      config%scene%has_density = is_given(report, "scene", "density")
       given%friction = is_given(report, "scene", "wall_friction")
       given%restitution = is_given(report, "scene", "wall_restitution")
       given%tangential_restitution = is_given(report, "scene", "wall_tangential_restitution")

@@ -40,6 +40,8 @@ module gravier_config_types
     real(dp) :: radius, mass
     !> kg/m^3 (kg/m^2 in 2D)
     real(dp) :: density
+    !> the case gives it
+    logical :: has_density = .false.
     !> bodies along each axis; in 2D the third entry is 1; all 0 unless bodies is lattice
     integer :: lattice_count(3)
     !> m; 0 unless bodies is lattice

@@ -24,6 +24,8 @@ module gravier_scene_scales
   type :: scene_scales_t
     !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius, or half thickness, of the grains that are not glued [m]
     real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
+    !> density of the grains of each material by their masses, 0 where there are none (materials, at least one) [kg/m^3, kg/m^2 in 2D]
+    real(dp), allocatable :: densities(:)
     !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
     real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
     !> largest speed of a grain that enters, where it has fallen to the lowest support [m/s]
@@ -75,6 +77,7 @@ contains
     self%diameter = simulation%velocity_scale%diameter
     if (.not. self%diameter > 0.0_dp) return
     self%density = simulation%velocity_scale%mass/grain_volume(simulation%decomposition%nd, 0.5_dp*self%diameter)
+    call find_densities(simulation, self%densities)
     call find_extent(simulation, extent, self%smallest)
     call find_times(simulation, times)
     call scan(self, simulation, extent, times)
@@ -97,6 +100,36 @@ contains
     real(dp), intent(in) :: h
     a = h*sqrt(self%pressure/self%density)/self%diameter
   end function scene_scales_relative_step
+
+  !> Densities of the materials by masses and volumes of their grains. Collective.
+  subroutine find_densities(simulation, densities)
+    type(simulation_t), intent(in) :: simulation
+    !> (materials, at least one)
+    real(dp), allocatable, intent(out) :: densities(:)
+    real(dp), allocatable :: parts(:, :), sums(:)
+    real(dp) :: volume
+    integer :: s, k, m, n
+
+    n = max(1, size(simulation%config%materials))
+    allocate (parts(2*n, size(simulation%decomposition%owned)), source=0.0_dp)
+    allocate (sums(2*n), densities(n))
+    do s = 1, size(parts, 2)
+      associate (owned => simulation%decomposition%owned(s))
+        do k = 1, owned%n
+          volume = grain_volume(owned%nd, owned%radius(k))
+          if (owned%no > 0) then
+            if (owned%shape(k) > 0) volume = simulation%decomposition%shapes%volume_of(owned%shape(k))*owned%radius(k)**owned%nd
+          end if
+          m = max(1, min(owned%material(k), n))
+          parts(m, s) = parts(m, s) + owned%mass(k)
+          parts(n + m, s) = parts(n + m, s) + volume
+        end do
+      end associate
+    end do
+    call simulation%comm%sum_parts(parts, sums)
+    densities(:) = 0.0_dp
+    where (sums(n + 1:) > 0.0_dp) densities = sums(1:n)/sums(n + 1:)
+  end subroutine find_densities
 
   !> Places of the grains and the smallest radius, of bodies with shapes half of the least thickness, in one pass. Collective.
   subroutine find_extent(simulation, extent, smallest)

@@ -79,6 +79,32 @@ class Scales(RunTestCase):
         memory = r"about \d+ MiB at most on a rank"
         self.assertEqual(re.sub(memory, "", text), re.sub(memory, "", self.check_case(LATTICE)))
 
+    def test_density_without_effect(self):
+        """A density that the case gives, while the bodies file gives other masses, is warned of: of a material, and of the scene, also with shapes. One
+        that is that of the masses, one that the case leaves out and one of a file without masses are not."""
+        disks = "id,x,y,radius,material,mass\n" + "".join(f"{k + 1},{k},0.5,0.01,{1 + k % 2},{m}\n" for k, m in enumerate([0.7854] * 4))
+        squares = "id,x,y,shape,radius,material,mass\n1,0,1,square,,1,100\n2,3,1,,0.01,1,0.31416\n"
+        shapes = "shape square\npolygon -0.1581139 -0.1581139 0.1581139 -0.1581139 0.1581139 0.1581139 -0.1581139 0.1581139\n"
+        light = {"name": "light", "density": 2500.0}
+        heavy = {"name": "heavy", "density": 7500.0}
+        words = "has no effect: the bodies file gives masses, which are those of a density of "
+        for title, bodies, scene, materials, wanted in (
+                ("material", disks, {"density": None}, [light, heavy], [f"&material 'heavy' density = 7.50E+03 {words}2.50E+03"]),
+                ("right", disks, {"density": 2500.0}, [light, {"name": "heavy"}], []),
+                ("scene", disks.replace("0.01,2,", "0.01,1,"), {"density": 7800.0}, [], [f"&scene density = 7.80E+03 {words}2.50E+03"]),
+                ("left out", disks.replace("0.01,2,", "0.01,1,").replace("0.7854", "9.0"), {"density": None}, [], []),
+                ("no masses", disks.replace(",mass", "").replace(",0.7854", ""), {"density": None}, [light, heavy], []),
+                ("shapes", squares, {"density": 1000.0, "shapes": "s.shapes"}, [], []),
+                ("other shapes", squares, {"density": 500.0, "shapes": "s.shapes"}, [], [f"&scene density = 5.00E+02 {words}1.00E+03"])):
+            with self.subTest(title):
+                scene = {**LATTICE["scene"], **scene, "bodies": "file", "bodies_file": "b.csv", "lattice_count": None, "radius_min": None, "radius_max": None,
+                         "gravity": [0.0, 0.0]}
+                case = {**LATTICE, "scene": {key: value for key, value in scene.items() if value is not None}, "material": materials,
+                        "solver": {"method": "nscdd"}, "decomposition": {"subdomains": 2}}
+                for ranks in (1, 2):
+                    text = self.check_case(case, ranks=ranks, files={"b.csv": bodies, "s.shapes": shapes})
+                    self.assertEqual([line[12:] for line in self.warnings(text)], wanted)
+
     def test_unit_of_lengths(self):
         """Grains of metres are large: millimetres that are meant as such are seen."""
         large = self.check_case(LATTICE, {"scene": {"radius_min": 4.0, "radius_max": 6.0}, "time": {"step": 0.01}})
