@@ -1,9 +1,18 @@
-!> What the log says of a sample before a run: that nobody has prepared it.
+!> What the log says of the grains of a scene before a run: of a sample, that nobody has prepared it; of those of a bodies file,
+!> that they have other masses than the case says.
 module gravier_sample_lines
+  use gravier_kinds, only: dp
+  use gravier_text, only: to_text
+  use gravier_config_laws, only: density_of
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: sample_warnings
+  public :: sample_warnings, density_warnings
+
+  !> part of a density by which masses of a file may differ from it
+  real(dp), parameter :: of_masses = 0.01_dp
+  !> digits of a density
+  integer, parameter :: digits = 3
 
 contains
 
@@ -24,5 +33,35 @@ contains
         & "&scene bodies = 'file'"//new_line("a")
     end associate
   end subroutine sample_warnings
+
+  !> Warnings, each a line ended by a newline, and their number: densities of the case that have no effect, because the bodies file
+  !> gives masses, which are those of others.
+  subroutine density_warnings(simulation, found, text, number)
+    type(simulation_t), intent(in) :: simulation
+    !> densities of the materials by the masses of their grains, 0 without grains (materials, or none) [kg/m^3, kg/m^2 in 2D]
+    real(dp), intent(in) :: found(:)
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    character(len=:), allocatable :: key
+    integer :: i
+
+    text = ""
+    number = 0
+    associate (config => simulation%config)
+      if (config%scene%bodies /= "file") return
+      do i = 1, size(found)
+        if (.not. (found(i) > 0.0_dp .and. abs(found(i) - density_of(config, i)) > of_masses*density_of(config, i))) cycle
+        key = ""
+        if (config%scene%has_density) key = "&scene"
+        if (size(config%materials) > 0) then
+          if (config%materials(i)%density_given) key = "&material '"//trim(config%materials(i)%name)//"'"
+        end if
+        if (key == "") cycle
+        number = number + 1
+        text = text//"warning     "//key//" density = "//to_text(density_of(config, i), digits)//" has no effect: the bodies "// &
+          & "file gives masses, which are those of a density of "//to_text(found(i), digits)//new_line("a")
+      end do
+    end associate
+  end subroutine density_warnings
 
 end module gravier_sample_lines

@@ -6,7 +6,6 @@ module gravier_scale_report
   use gravier_time_table, only: time_table_t
   use gravier_boundary_drive, only: drive_rates
   use gravier_cell_drive, only: cell_components
-  use gravier_config_laws, only: density_of
   use gravier_simulation, only: simulation_t
   use gravier_scene_scales, only: scene_scales_t
   implicit none
@@ -17,8 +16,6 @@ module gravier_scale_report
   !> digits of a figure
   integer, parameter :: digits = 3
 
-  !> part of a density by which masses of a file may differ from it
-  real(dp), parameter :: of_masses = 0.01_dp
   !> mean diameter from which the unit of lengths is named [m]
   real(dp), parameter :: large_grains = 1.0_dp
   !> diameters by which loads may move a free grain in a step: that is h sqrt(P/rho)/d = 0.1 at the pressure of one layer of grains
@@ -104,14 +101,6 @@ contains
     text = text//newline
   end function distance_line
 
-  !> Whether grains have another density than the one that is given, beyond what masses are rounded by.
-  pure logical function differs(found, given)
-    !> 0 without grains
-    real(dp), intent(in) :: found, given
-
-    differs = found > 0.0_dp .and. abs(found - given) > of_masses*given
-  end function differs
-
   !> Warnings, each a line ended by a newline, and their number.
   subroutine scale_warnings(simulation, scales, text, number)
     type(simulation_t), intent(in) :: simulation
@@ -135,7 +124,6 @@ contains
         halves = " times half of the mean thickness"
         least = " times half of the thickness of the thinnest grain"
       end if
-      call warn_densities()
       g = norm2(scales%acceleration)
       if (g*h**2 > most_by_gravity*d) call warn_step("loads move a free grain by "//figure(g*h**2/d)// &
         & " mean diameters in it", sqrt(most_by_gravity*d/g))
@@ -183,26 +171,6 @@ contains
       real(dp), intent(in) :: most
       call warn("&time step = "//figure(simulation%config%time%step)//" s: "//why//"; at most "//figure(most)//" s would do")
     end subroutine warn_step
-
-    !> Of densities that the case gives and grains of the bodies file do not have, because the file gives masses.
-    subroutine warn_densities()
-      character(len=:), allocatable :: key
-      integer :: i
-
-      associate (config => simulation%config)
-        if (config%scene%bodies /= "file") return
-        do i = 1, size(scales%densities)
-          if (.not. differs(scales%densities(i), density_of(config, i))) cycle
-          key = ""
-          if (config%scene%has_density) key = "&scene"
-          if (size(config%materials) > 0) then
-            if (config%materials(i)%density_given) key = "&material '"//trim(config%materials(i)%name)//"'"
-          end if
-          if (key /= "") call warn(key//" density = "//figure(density_of(config, i))//" has no effect: the bodies file gives "// &
-            & "masses, which are those of a density of "//figure(scales%densities(i)))
-        end do
-      end associate
-    end subroutine warn_densities
 
     !> Nothing where the line is empty.
     subroutine warn(line)

@@ -24,7 +24,8 @@ module gravier_scene_scales
   type :: scene_scales_t
     !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius, or half thickness, of the grains that are not glued [m]
     real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
-    !> density of the grains of each material by their masses, 0 where there are none (materials, at least one) [kg/m^3, kg/m^2 in 2D]
+    !> density of the grains of each material by their masses, 0 where there are none (materials, at least one)
+    !> [kg/m^3, kg/m^2 in 2D]
     real(dp), allocatable :: densities(:)
     !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
     real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
@@ -75,9 +76,9 @@ contains
     real(dp), allocatable :: times(:)
 
     self%diameter = simulation%velocity_scale%diameter
+    call find_densities(simulation, self%densities)
     if (.not. self%diameter > 0.0_dp) return
     self%density = simulation%velocity_scale%mass/grain_volume(simulation%decomposition%nd, 0.5_dp*self%diameter)
-    call find_densities(simulation, self%densities)
     call find_extent(simulation, extent, self%smallest)
     call find_times(simulation, times)
     call scan(self, simulation, extent, times)
