@@ -72,7 +72,7 @@ def parse(arguments):
     for kind in (forces, fields):
         kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):
-        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other in the place of single steps")
+        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N rows of history.csv after each other, which are steps unless history_every is more than 1")
     for kind in (mixing, heap, walls, outflow, forces, fields):
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
     for kind in (mixing, heap, walls, outflow, forces, fields, sieve):

@@ -214,7 +214,7 @@ class Jobs(RunTestCase):
         self.assertEqual(lines[3], "t_3,changed,0.7,c,,,")
         self.assertEqual(self.sh(*table, "--mean", "12", "t.nml").stdout.splitlines()[2], "t_2,unfinished,0.3,b,,,")
         for arguments, words in (((*job, "--table", "contacts,weight", "t.nml"), "history.csv: no column weight; expected one of step,time,contacts"),
-                                 ((*table, "--mean", "13", "t.nml"), "t_1/history.csv: 12 steps; expected 13 at least"), ((*table, "--mean", "0", "t.nml"), "--mean 0: expected a number of steps"),
+                                 ((*table, "--mean", "13", "t.nml"), "t_1/history.csv: 12 rows; expected 13 at least"), ((*table, "--mean", "0", "t.nml"), "--mean 0: expected a number of steps"),
                                  ((*job, "--mean", "3", "t.nml"), "--mean 3: expected --table COLUMNS too"), (("gravier_job", "--table", "a", "t.nml"), "--table a: expected --list LIST.csv too"),
                                  ((*table, "--row", "9", "t.nml"), "no row 9")):
             done = self.sh(*arguments)

@@ -79,6 +79,10 @@ class Mixing(unittest.TestCase):
         np.testing.assert_allclose(table.mixing[:2], 0.0, atol=1e-12)
         self.assertGreater(table.mixing[2], 0.9)
         self.assertEqual(len(gravier.mixing(States(bed, mirrored, mixed), by="y", since=0.15)), 1)
+        fed = States(bed, mirrored)
+        fed.case = {**fed.case, "insertion": [{}]}
+        with self.assertRaisesRegex(gravier.ResultsError, "mixing by y of grains that enter while it goes on, .* expected a run without &insertion, or mixing by size or material"):
+            gravier.mixing(fed, by="y")
 
     def test_sizes_and_materials(self):
         """Large grains under small ones have -1, by volume; the same kinds by material."""
@@ -390,10 +394,18 @@ class WallTests(RunTestCase):
             np.testing.assert_allclose(found.lateral_strain_x, 1.0 - wide / wide[0], atol=1e-12)
             np.testing.assert_allclose(found.volumetric_strain, 1.0 - wide * high / (wide * high)[0], atol=1e-12)
             np.testing.assert_allclose(found.void_ratio, wide * high / (np.pi * R**2) - 1.0, rtol=1e-12)
-        for words, options in (("20 steps after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
-                               ("0 steps after 9 s", {"since": 9.0})):
+        for words, options in (("20 rows after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
+                               ("0 rows after 9 s", {"since": 9.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.wall_test(run, **options)
+        thin = self.squeezed("thin", boundaries=sides, more={"history_every": 7})
+        whole, found = (gravier.wall_test(one) for one in (run, thin))
+        self.assertEqual(found.step.tolist(), [1, 7, 14, 20])
+        for name in ("axial_strain", "lateral_strain_x", "volumetric_strain"):
+            np.testing.assert_array_equal(found[name], whole[name][found.step.astype(int) - 1])
+        np.testing.assert_array_equal(gravier.wall_test(thin, since=0.0065).step, [7, 14, 20])
+        with self.assertRaisesRegex(gravier.ResultsError, r"thin/history.csv: no row of step 10, the first one after 0.0095 s, to which strains refer; expected one, as"):
+            gravier.wall_test(thin, since=0.0095)
         with self.assertRaisesRegex(gravier.ResultsError, r"no column position_x:low x; &output boundary_forces"):
             gravier.wall_test(self.squeezed("no forces", more={"boundary_forces": False}))
         sides[2].pop("remove_at")
@@ -496,8 +508,8 @@ class Command(RunTestCase):
                 getattr(gravier.outflow(run, 400), name)
             with self.assertRaisesRegex(KeyError, words):
                 gravier.outflow(run, 400)[name]
-        for options, words in (({"mean": 0}, "mean 0: expected a whole number of steps above 0"), ({"mean": 401}, "400 steps after 0 s; expected 401 at least"),
-                               ({"since": 0.4}, "0 steps after 0.4 s; expected 1 at least")):
+        for options, words in (({"mean": 0}, "mean 0: expected a whole number of rows above 0"), ({"mean": 401}, "400 rows after 0 s; expected 401 at least"),
+                               ({"since": 0.4}, "0 rows after 0.4 s; expected 1 at least")):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.outflow(run, **options)
         done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)

@@ -108,6 +108,9 @@ def _kind(run, bodies, by, value):
     axes = "xyz"[:run.dimension]
     if by not in tuple(axes):
         raise ResultsError(f"by {by!r}: expected one of size, material, {', '.join(axes)}")
+    if "insertion" in run.case:
+        raise ResultsError(f"{run.path}: mixing by {by} of grains that enter while it goes on, which have no place in its first state; expected a run without &insertion, or "
+                           "mixing by size or material")
     place = bodies.position[:, axes.index(by)]
     above = bodies.id[place > (np.median(place) if value is None else _number(value, by))]
     return lambda held: np.isin(held.id, above)

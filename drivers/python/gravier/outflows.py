@@ -25,18 +25,18 @@ class Outflow(Table):
 
 
 def outflow(run, mean=1, since=0.0):
-    """What has left through outlets, from history.csv: a row for `mean` steps after each other, with step and time of their end, total_left and total_left_mass, the
+    """What has left through outlets, from history.csv: a row for `mean` rows after each other, with step and time of their end, total_left and total_left_mass, the
     number and the mass [kg] of the grains that have left since the time `since` [s], number_rate [1/s] and mass_rate [kg/s] over these steps. Rows behind
     the last whole block are left out. In the plane masses are those of a length of 1 m."""
     if not isinstance(mean, (int, np.integer)) or mean < 1:
-        raise ResultsError(f"mean {mean!r}: expected a whole number of steps above 0")
+        raise ResultsError(f"mean {mean!r}: expected a whole number of rows above 0")
     history = run.history()
     if "left_mass" not in history:
         raise ResultsError(f"{run.directory}/history.csv: no column left_mass; expected a run with a boundary of shape outlet")
     later = history.time > since
     rows = Table({name: history[name][later] for name in ("step", "time", "left", "left_mass")})
     if len(rows) < mean:
-        raise ResultsError(f"{run.directory}/history.csv: {len(rows)} steps after {since:g} s; expected {mean} at least")
+        raise ResultsError(f"{run.directory}/history.csv: {len(rows)} rows after {since:g} s; expected {mean} at least")
     last = np.arange(mean - 1, len(rows), mean)
     found = {"step": rows.step[last], "time": rows.time[last], "total_left": np.cumsum(rows.left)[last], "total_left_mass": np.cumsum(rows.left_mass)[last]}
     for rate, total in (("number_rate", "total_left"), ("mass_rate", "total_left_mass")):

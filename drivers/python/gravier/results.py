@@ -339,7 +339,7 @@ class Run:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
 
     def history(self):
-        """history.csv: a row a step. `history().means(100)` are the means of a hundred steps after each other."""
+        """history.csv: a row a step. `history().means(100)` are the means of a hundred rows after each other: of steps, unless history_every is more than 1."""
         return read_table(self.directory / "history.csv", ("step", "time"))
 
     def trace(self):

@@ -10,7 +10,7 @@ TOLD = 0.01
 
 
 def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
-    """Measures of a test whose sample lies between planes, from history.csv with boundary_forces = .true.: a row of means of `mean` steps after
+    """Measures of a test whose sample lies between planes, from history.csv with boundary_forces = .true.: a row of means of `mean` rows after
     each other, with step, time, axial_strain, lateral_strain_x, ..., volumetric_strain, void_ratio, solid_fraction, axial_stress, lateral_stress,
     stress_ratio and sin_phi.
 
@@ -22,12 +22,29 @@ def wall_test(run, axial=None, lateral=None, mean=1, since=0.0):
     axes = "xyz"[:run.dimension]
     axial, lateral = _chosen_axes(axes, axial, lateral)
     if not isinstance(mean, (int, np.integer)) or mean < 1:
-        raise ResultsError(f"mean {mean!r}: expected a whole number of steps above 0")
+        raise ResultsError(f"mean {mean!r}: expected a whole number of rows above 0")
+    _check_start(run, since)
+    return _measures(run, axial, lateral, mean, since)
+
+
+def _check_start(run, since):
+    """Refuse a time of a run whose history.csv has no row of the step after it, to which strains refer."""
+    history = run.history()
+    steps = history.step[history.time > since]
+    first = int(since * history.step[-1] / history.time[-1] + 1e-6) + 1 if len(steps) > 0 else 1
+    if len(steps) > 0 and steps[0] > first:
+        raise ResultsError(f"{run.directory}/history.csv: no row of step {first}, the first one after {since:g} s, to which strains refer; expected one, as with "
+                           "&output history_every = 1")
+
+
+def _measures(run, axial, lateral, mean, since):
+    """The rows of wall_test, with strains over the sizes in the first row after the time `since`."""
+    axes = "xyz"[:run.dimension]
     history = _history_since(run, since)
     planes = {axis: _planes(run, history, axis) for axis in axes}
     rows = _with_sizes(run, history, planes)
     if len(rows) < mean:
-        raise ResultsError(f"{run.directory}/history.csv: {len(rows)} steps after {since:g} s; expected {mean} at least")
+        raise ResultsError(f"{run.directory}/history.csv: {len(rows)} rows after {since:g} s; expected {mean} at least")
     start = {axis: rows[f"size_{axis}"][0] for axis in axes}
     volume = _solid_volume(run, history)
     rows = rows.means(int(mean))
@@ -52,7 +69,7 @@ def sine_of_means(run, options, first, since=0.0):
     time = run.history().time
     time = time[time > since]
     rows = len(time) // mean - first
-    return float(wall_test(run, axial, lateral, rows * mean, since if first == 0 else time[first * mean - 1]).sin_phi[0])
+    return float(_measures(run, *_chosen_axes("xyz"[:run.dimension], axial, lateral), rows * mean, since if first == 0 else time[first * mean - 1]).sin_phi[0])
 
 
 def ways_through_air(run, since=0.0):
