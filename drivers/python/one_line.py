@@ -79,7 +79,12 @@ def run_tool(main):
     away; ^C ends it with 130, and a reader of its output who has seen enough, as `head`, with 141: both without a traceback."""
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
     try:
-        sys.exit(main())
+        try:
+            status = main()
+        finally:
+            # not only at the end of the interpreter, which nothing could catch
+            sys.stdout.flush()
+        sys.exit(status)
     except KeyboardInterrupt:
         sys.exit(128 + signal.SIGINT)
     except BrokenPipeError:
