@@ -38,7 +38,8 @@ contains
   !> gives masses, which are those of others.
   subroutine density_warnings(simulation, found, text, number)
     type(simulation_t), intent(in) :: simulation
-    !> densities of the materials by the masses of their grains, 0 without grains (materials, or none) [kg/m^3, kg/m^2 in 2D]
+    !> densities of the materials by the masses of a bodies file (materials, at least one), 0 where it gives none
+    !> [kg/m^3, kg/m^2 in 2D]
     real(dp), intent(in) :: found(:)
     character(len=:), allocatable, intent(out) :: text
     integer, intent(out) :: number
@@ -48,7 +49,6 @@ contains
     text = ""
     number = 0
     associate (config => simulation%config)
-      if (config%scene%bodies /= "file") return
       do i = 1, size(found)
         if (.not. (found(i) > 0.0_dp .and. abs(found(i) - density_of(config, i)) > of_masses*density_of(config, i))) cycle
         key = ""

@@ -24,8 +24,8 @@ module gravier_scene_scales
   type :: scene_scales_t
     !> of the mean grain [m], [kg/m^3, kg/m^2 in 2D]; smallest radius, or half thickness, of the grains that are not glued [m]
     real(dp) :: diameter = 0.0_dp, density = 0.0_dp, smallest = 0.0_dp
-    !> density of the grains of each material by their masses, 0 where there are none (materials, at least one)
-    !> [kg/m^3, kg/m^2 in 2D]
+    !> density of the grains of each material by the masses of a bodies file (materials, at least one); 0 without such a file, and
+    !> of a material without grains [kg/m^3, kg/m^2 in 2D]
     real(dp), allocatable :: densities(:)
     !> acceleration by gravity and the force on volumes [m/s^2]; height that grains have to fall [m]
     real(dp) :: acceleration(3) = 0.0_dp, fall = 0.0_dp
@@ -102,7 +102,7 @@ contains
     a = h*sqrt(self%pressure/self%density)/self%diameter
   end function scene_scales_relative_step
 
-  !> Densities of the materials by masses and volumes of their grains. Collective.
+  !> Densities of the materials by masses and volumes of their grains, where a file gives the bodies. Collective.
   subroutine find_densities(simulation, densities)
     type(simulation_t), intent(in) :: simulation
     !> (materials, at least one)
@@ -112,8 +112,10 @@ contains
     integer :: s, k, m, n
 
     n = max(1, size(simulation%config%materials))
+    allocate (densities(n), source=0.0_dp)
+    if (simulation%config%scene%bodies /= "file") return
     allocate (parts(2*n, size(simulation%decomposition%owned)), source=0.0_dp)
-    allocate (sums(2*n), densities(n))
+    allocate (sums(2*n))
     do s = 1, size(parts, 2)
       associate (owned => simulation%decomposition%owned(s))
         do k = 1, owned%n
@@ -128,7 +130,6 @@ contains
       end associate
     end do
     call simulation%comm%sum_parts(parts, sums)
-    densities(:) = 0.0_dp
     where (sums(n + 1:) > 0.0_dp) densities = sums(1:n)/sums(n + 1:)
   end subroutine find_densities
 

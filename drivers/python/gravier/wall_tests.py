@@ -31,8 +31,10 @@ def _check_start(run, since):
     """Refuse a time of a run whose history.csv has no row of the step after it, to which strains refer."""
     history = run.history()
     steps = history.step[history.time > since]
-    first = int(since * history.step[-1] / history.time[-1] + 1e-6) + 1 if len(steps) > 0 else 1
-    if len(steps) > 0 and steps[0] > first:
+    if len(steps) == 0:
+        return
+    first = int(since * history.step[-1] / history.time[-1] + 1e-6) + 1
+    if steps[0] > first:
         raise ResultsError(f"{run.directory}/history.csv: no row of step {first}, the first one after {since:g} s, to which strains refer; expected one, as with "
                            "&output history_every = 1")
 

@@ -57,7 +57,7 @@ module gravier_refinement
     logical, private :: goes_back = .false.
     !> further steps whose solves aim at less error for the bonds; iterations of the last solve to the goal of the user alone
     integer, private :: caution = 0, usual = 0
-    !> velocity error of the last step, which the bodies of bonds start the present one with [m/s]
+    !> velocity error of the last step, with which bonded bodies start the present one [m/s]
     real(dp), private :: before = 0.0_dp
     type(backoff_t), private :: backoff = backoff_t(forgiven=1)
   contains
@@ -73,8 +73,8 @@ module gravier_refinement
 
 contains
 
-  !> The velocity up to which the bodies of a bond at its limit may part by errors [m/s]: of the last solve, and of the one before,
-  !> because an exact solve takes back within one step what the bodies start with in error.
+  !> The velocity up to which the bodies of a bond at its limit may part by errors alone [m/s]. These are errors of the last solve,
+  !> and of the step before: a more exact solve takes them back within one step.
   pure real(dp) function refinement_doubt(self, uncertain, goal) result(doubt)
     class(refinement_t), intent(in) :: self
     !> by the estimate of the solve; the error that the user allows [m/s]

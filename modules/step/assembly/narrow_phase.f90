@@ -342,8 +342,8 @@ contains
 
   !> Whether an open contact, written behind the last one of the list, does nothing in this step under its terms. Restitution acts
   !> at the moment of touching (Moreau 1988). A step has the impacts of the half step before its middle, whose contacts are closed,
-  !> and those of the half step behind it, so that impacts are early as often as late. Those of bodies with shapes are late: a look
-  !> ahead would stop them at joints of what they slide over.
+  !> and of the half step after it, so that impacts are early as often as late. Impacts of bodies with shapes are late, because a
+  !> look ahead would stop these bodies at joints of what they slide over.
   pure logical function is_idle(view, decomposition, physics, found, terms)
     type(local_bodies_t), intent(in) :: view
     type(decomposition_t), intent(in) :: decomposition
