@@ -251,8 +251,12 @@ class Pictures(RunTestCase):
             raise unittest.SkipTest("NO VTK: its own reader was not tried; pip install vtk (9.4 at least), or set GRAVIER_VTK_PYTHON")
         if python is None or not paths:
             return
-        done = subprocess.run([python, os.path.join(SOURCE, "tests/support/read_vtk.py"), *paths], capture_output=True, text=True,
-                              check=False)
+        command = [python, os.path.join(SOURCE, "tests/support/read_vtk.py"), *paths]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode < 0:
+            # the process of VTK ended by a signal once in some hundred calls ("munmap_chunk(): invalid pointer"), and valgrind finds
+            # nothing in it: what is wrong with a file ends the second call, too
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
         self.assertEqual((done.returncode, "ERR" in done.stderr), (0, False), done.stderr[-2000:])
         for path in paths:
             steps = list(read(path).values())
