@@ -8,7 +8,7 @@ module gravier_config_check_grains
   use gravier_config_report, only: report_t, expect, is_given, shown_text
   implicit none
   private
-  public :: check_grains
+  public :: check_grains, check_shares
 
 contains
 
@@ -59,19 +59,32 @@ contains
     character(len=*), intent(in) :: group
     type(grains_config_t), intent(in) :: grains
     type(error_t), allocatable, intent(inout) :: error
-    integer :: n
 
     call expect(report, .not. has_empty_name(grains%grain_shapes), group, "grain_shapes", error, &
                 "the name of a shape before and behind each comma")
-    n = count_names(grains%grain_shapes)
-    call expect(report, n == 0 .or. config%scene%shapes /= "", group, "grain_shapes", error, &
+    call expect(report, count_names(grains%grain_shapes) == 0 .or. config%scene%shapes /= "", group, "grain_shapes", error, &
                 "shapes of &scene, the path of the file that has them")
-    if (.not. is_given(report, group, "grain_shares")) return
-    call expect(report, n > 0 .and. n <= size(grains%grain_shares), group, "grain_shares", error, &
-                "it where grain_shapes names one shape to "//to_text(size(grains%grain_shares)))
-    n = min(n, size(grains%grain_shares))
-    call expect(report, all(grains%grain_shares(:n) > 0.0_dp) .and. .not. any(abs(grains%grain_shares(n + 1:)) > 0.0_dp), &
-                group, "grain_shares", error, "a share above 0 for each of the "//to_text(n)//" grain_shapes")
+    call check_shares(report, group, "grain_shapes", grains%grain_shapes, "grain_shares", grains%grain_shares, error)
   end subroutine check_grain_shapes
+
+  !> Fails (status_input) where shares are given and are not one above 0 for each of the names, of which there are not too many.
+  subroutine check_shares(report, group, names_key, names, shares_key, shares, error)
+    type(report_t), intent(in) :: report
+    !> the group, its key of names and its key of shares
+    character(len=*), intent(in) :: group, names_key, shares_key
+    !> names with commas or blanks between
+    character(len=*), intent(in) :: names
+    real(dp), intent(in) :: shares(:)
+    type(error_t), allocatable, intent(inout) :: error
+    integer :: n
+
+    if (.not. is_given(report, group, shares_key)) return
+    n = count_names(names)
+    call expect(report, n > 0 .and. n <= size(shares), group, shares_key, error, &
+                "it where "//names_key//" has one name to "//to_text(size(shares)))
+    n = min(n, size(shares))
+    call expect(report, all(shares(:n) > 0.0_dp) .and. .not. any(abs(shares(n + 1:)) > 0.0_dp), group, shares_key, error, &
+                "a share above 0 for each of the "//to_text(n)//" "//names_key)
+  end subroutine check_shares
 
 end module gravier_config_check_grains

@@ -6,6 +6,7 @@ module gravier_config_check_insertion
   use gravier_config_report, only: report_t, expect, expect_own_name, shown_text
   use gravier_config_check_grains, only: check_grains
   use gravier_config_laws, only: material_number
+  use gravier_config_check_laws, only: names_of_materials
   implicit none
   private
   public :: check_insertions
@@ -82,11 +83,9 @@ contains
     type(config_t), intent(in) :: config
     type(insertion_config_t), intent(in) :: insertion
     type(error_t), allocatable, intent(inout) :: error
-    logical :: known
 
     if (.not. insertion%material_given) return
-    known = material_number(config, insertion%material) > 0
-    call expect(report, known, "insertion", "material", error, "the name of a &material")
+    call expect(report, material_number(config, insertion%material) > 0, "insertion", "material", error, names_of_materials(config))
   end subroutine check_material
 
 end module gravier_config_check_insertion

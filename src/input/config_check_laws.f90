@@ -14,7 +14,7 @@ module gravier_config_check_laws
   use gravier_config_check_boundary, only: is_pivoting, not_turning
   implicit none
   private
-  public :: check_materials, check_laws
+  public :: check_materials, check_laws, names_of_materials
 
 contains
 
@@ -37,12 +37,12 @@ contains
                   error, "none where bodies = 'column': mass is the mass of each body")
     end do
     report%instance = 1
-    call expect(report, is_known(config, config%scene%wall_material), "scene", "wall_material", error, names_of(config))
+    call expect(report, is_known(config, config%scene%wall_material), "scene", "wall_material", error, names_of_materials(config))
     do i = 1, size(config%boundaries)
       report%instance = i
       ! that of &scene is refused there
       call expect(report, is_known(config, config%boundaries(i)%material) .or. .not. config%boundaries(i)%material_given, &
-                  "boundary", "material", error, names_of(config))
+                  "boundary", "material", error, names_of_materials(config))
     end do
     report%instance = 1
   end subroutine check_materials
@@ -55,8 +55,8 @@ contains
     if (.not. is_known) is_known = material_number(config, name) > 0
   end function is_known
 
-  !> The names of all materials as one expects them.
-  pure function names_of(config) result(text)
+  !> The names of all materials, as a message expects one of them.
+  pure function names_of_materials(config) result(text)
     type(config_t), intent(in) :: config
     character(len=:), allocatable :: text
     integer :: i
@@ -66,7 +66,7 @@ contains
       if (i == 1) text = "'"//trim(config%materials(1)%name)//"'"
       if (i > 1) text = text//trim(merge(" or", ",  ", i == size(config%materials)))//" '"//trim(config%materials(i)%name)//"'"
     end do
-  end function names_of
+  end function names_of_materials
 
   !> Fails (status_input) with the first rule that a law breaks. Keys that do not belong to its kind are not given.
   subroutine check_laws(report, config, error)
@@ -80,7 +80,7 @@ contains
     do i = 1, size(config%laws)
       report%instance = i
       pair(:) = pair_of(config, i)
-      call expect(report, all(pair > 0), "law", "materials", error, names_of(config))
+      call expect(report, all(pair > 0), "law", "materials", error, names_of_materials(config))
       do k = 1, i - 1
         earlier(:) = pair_of(config, k)
         call expect(report, any(pair /= earlier) .and. any(pair /= earlier(2:1:-1)), "law", "materials", error, &

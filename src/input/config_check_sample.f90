@@ -4,7 +4,10 @@ module gravier_config_check_sample
   use gravier_errors, only: error_t
   use gravier_surface_registry, only: wall_of_bodies
   use gravier_config_types, only: config_t
-  use gravier_config_check_grains, only: check_grains
+  use gravier_config_laws, only: material_number
+  use gravier_config_names, only: count_names, get_name, has_empty_name
+  use gravier_config_check_grains, only: check_grains, check_shares
+  use gravier_config_check_laws, only: names_of_materials
   use gravier_config_report, only: report_t, expect, miss, is_given, shown_text
   implicit none
   private
@@ -20,6 +23,8 @@ contains
 
     call expect(report, config%sample%count >= 1, "sample", "count", error)
     call check_grains(report, config, "sample", config%sample%grains_config_t, error)
+    call check_grain_materials(report, config, error)
+    call expect(report, all(config%sample%velocity_spread >= 0.0_dp), "sample", "velocity_spread", error)
     call check_box(report, config, error)
     call check_preparation(report, config, error)
     if (config%sample%container == "boundaries") call check_container(report, config, error)
@@ -35,6 +40,25 @@ contains
     has_ending = .false.
     if (n > len(ending)) has_ending = file(n - len(ending) + 1:n) == ending
   end function has_ending
+
+  !> Each name is that of a material, and shares have names.
+  subroutine check_grain_materials(report, config, error)
+    type(report_t), intent(in) :: report
+    type(config_t), intent(in) :: config
+    type(error_t), allocatable, intent(inout) :: error
+    character(len=:), allocatable :: name
+    integer :: k
+
+    associate (names => config%sample%grain_materials)
+      call expect(report, .not. has_empty_name(names), "sample", "grain_materials", error, &
+                  "the name of a material before and behind each comma")
+      do k = 1, count_names(names)
+        call get_name(names, k, name)
+        call expect(report, material_number(config, name) > 0, "sample", "grain_materials", error, names_of_materials(config))
+      end do
+      call check_shares(report, "sample", "grain_materials", names, "material_shares", config%sample%material_shares, error)
+    end associate
+  end subroutine check_grain_materials
 
   !> The box fits the period; what it leaves open is its last size, which another key or the grains give.
   subroutine check_box(report, config, error)

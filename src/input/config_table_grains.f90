@@ -26,7 +26,20 @@ module gravier_config_table_grains
      key_t("sample", "count", kind_integer, "0", ">= 1", "number of grains", note="required", required=.true.)]
 
   type(key_t), parameter :: prepared_keys(*) = &
-    [key_t("sample", "box", kind_real, "3*0", ">= 0", &
+    [key_t("sample", "grain_materials", kind_text, "''", "", &
+           "names of the `&material` groups that grains are dealt out to at random, with commas between", &
+           note="the first, for all grains"), &
+     key_t("sample", "material_shares", kind_real, "8*0", "> 0", &
+           "fractions by number of the first eight `grain_materials`, to any scale", &
+           count=8, planar=8, note="equal fractions"), &
+     key_t("sample", "velocity", kind_real, "3*0", "", &
+           "velocity of the sample as a whole; its third component is 0 in 2D", &
+           count=3, unit="m/s", chooser="preparation", chosen="none"), &
+     key_t("sample", "velocity_spread", kind_real, "3*0", ">= 0", &
+           "most by which each component of the velocity of a grain is drawn above or below `velocity`, all values as likely; "// &
+           "then all are moved by the same velocity so that the momentum is that of `velocity`", &
+           count=3, unit="m/s", chooser="preparation", chosen="none"), &
+     key_t("sample", "box", kind_real, "3*0", ">= 0", &
            "size of the box along each axis; if the last is 0, the lattice or `solid_fraction` determines it; "// &
            "the third is 0 in 2D", &
            count=3, unit="m", note="the period, along an axis that is periodic"), &
@@ -35,7 +48,7 @@ module gravier_config_table_grains
            "random positions reach about 0.53 in 2D and 0.35 in 3D for grains of one radius in a wide box, and "// &
            "0.45 in a 2D box two diameters wide; a fraction that leaves grains without a place is refused", &
            note="`0.35` in 2D, `0.2` in 3D", chooser="arrangement", chosen="loose"), &
-     key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii and places"), &
+     key_t("sample", "seed", kind_integer, "1", "", "seed of the random radii, places, shapes, materials and velocities"), &
      key_t("sample", "pressure", kind_real, "0", "> 0", "pressure on the box", &
            unit="Pa, N/m in 2D", note="required", chooser="preparation", chosen="compacted"), &
      key_t("sample", "rest_tolerance", kind_real, "1e-6", "> 0", &

@@ -283,6 +283,11 @@ module gravier_config_types
     logical :: inner_point_given = .false.
     !> grains
     integer :: count
+    !> names of materials, with commas or blanks between; shares by number, all 0 for equal ones
+    character(len=text_length) :: grain_materials
+    real(dp) :: material_shares(8)
+    !> m/s: none
+    real(dp) :: velocity(3), velocity_spread(3)
     !> m; the period along a periodic axis; the last may be 0: found from solid_fraction; the third is 0 in 2D
     real(dp) :: box(3)
     !> of a loose sample whose last size is 0

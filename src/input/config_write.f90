@@ -104,7 +104,8 @@ contains
     if (key%group == "scene" .and. key%name == "gravity") in_force = config%scene%gravity_table == ""
     if (key%group == "sample" .and. key%name == "solid_fraction") &
       in_force = in_force .and. config%sample%box(config%scene%dimension) <= 0.0_dp
-    if (all([character(len=14) :: "grain_shapes", "grain_shares", "tracked_bodies"] /= key%name)) return
+    if (all([character(len=15) :: "grain_shapes", "grain_shares", "grain_materials", "material_shares", &
+      & "tracked_bodies"] /= key%name)) return
     slot = slot_of(config, key, instance)
     if (associated(slot%text)) in_force = slot%text /= ""
     if (associated(slot%reals)) in_force = any(slot%reals > 0.0_dp)

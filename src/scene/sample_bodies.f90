@@ -16,6 +16,7 @@ module gravier_sample_bodies
   use gravier_config_laws, only: density_of
   use gravier_shape_library, only: shape_library_t
   use gravier_sample_shapes, only: draw_shapes
+  use gravier_sample_materials, only: draw_materials, draw_velocities
   use gravier_sample_container, only: set_container
   implicit none
   private
@@ -44,8 +45,9 @@ contains
     radii%radius_min = config%scene%radius_min
     radii%radius_max = config%scene%radius_max
     data%total = product(int(config%scene%lattice_count(1:box%nd), i8))
-    call draw_grains(comm, radii, density_of(config, 1), config%scene%seed, data, error)
+    call draw_grains(comm, radii, config%scene%seed, data, error)
     if (allocated(error)) return
+    call set_masses(config, data)
     call check_box(comm, config, box, data, error)
     if (allocated(error)) return
     call lattice%init(box, config%scene%radius_max, data%total, never)
@@ -102,10 +104,10 @@ contains
     far = -comm%highest(-far)
   end function farthest_place
 
-  !> The sample of &sample before any preparation: grains at rest with identifiers from 1, and, if not boundaries hold them, a plane
-  !> on each side of the box that is not periodic, but a lid only where the grains are to be compacted; the box is that of the
-  !> period. Grains with shapes are placed by the balls that hold them. Failure (status_input): a table of radii that cannot be
-  !> read, grains that find no place, shapes that the library does not have. Errors are the same on all ranks. Collective.
+  !> The sample of &sample before any preparation: grains with identifiers from 1, and, if not boundaries hold them, a plane on each
+  !> side of the box that is not periodic, but a lid only where the grains are to be compacted; the box is that of the period.
+  !> Grains with shapes are placed by the balls that hold them. Failure (status_input): a table of radii that cannot be read,
+  !> grains that find no place, shapes that the library does not have. Errors are the same on all ranks. Collective.
   subroutine make_sample(comm, config, shapes, data, error)
     type(communicator_t), intent(in) :: comm
     type(config_t), intent(in) :: config
@@ -119,8 +121,10 @@ contains
     call set_radii(comm, config%sample%grains_config_t, config%scene%dimension, radii, error)
     if (allocated(error)) return
     data%total = config%sample%count
-    call draw_grains(comm, radii, density_of(config, 1), config%sample%seed, data, error)
+    call draw_grains(comm, radii, config%sample%seed, data, error)
     if (allocated(error)) return
+    call draw_materials(config, data)
+    call set_masses(config, data)
     box%nd = config%scene%dimension
     box%lower(:) = config%scene%period_origin
     box%upper(:) = box%lower + config%sample%box
@@ -140,6 +144,8 @@ contains
       return
     end if
     if (shapes%n > 0) call draw_shapes(comm, config, shapes, data, error)
+    if (allocated(error)) return
+    call draw_velocities(comm, config, data)
     if (box%is_held) then
       call allocate_walls(data, box%nd, 0, "planes", error)
     else
@@ -169,12 +175,11 @@ contains
     if (grains%radii == "table") call radii%read_table(comm, trim(grains%radius_table), error)
   end subroutine set_radii
 
-  !> Identifiers, radii and masses of the grains of this rank, of `data%total` in all, at rest.
-  subroutine draw_grains(comm, radii, density, seed, data, error)
+  !> Identifiers and radii of the grains of this rank, of `data%total` in all, at rest and of the first material. There is room for
+  !> their masses.
+  subroutine draw_grains(comm, radii, seed, data, error)
     type(communicator_t), intent(in) :: comm
     type(radius_distribution_t), intent(in) :: radii
-    !> [kg/m^nd]
-    real(dp), intent(in) :: density
     integer, intent(in) :: seed
     type(bodies_data_t), intent(inout) :: data
     type(error_t), allocatable, intent(inout) :: error
@@ -188,9 +193,19 @@ contains
     do k = 1, n
       data%id(k) = first + k
       data%radius(k) = radii%draw(data%id(k), seed)
-      data%mass(k) = grain_mass(radii%nd, data%radius(k), density)
     end do
   end subroutine draw_grains
+
+  !> Masses of the grains as disks or spheres of their materials.
+  subroutine set_masses(config, data)
+    type(config_t), intent(in) :: config
+    type(bodies_data_t), intent(inout) :: data
+    integer :: k
+
+    do k = 1, data%n
+      data%mass(k) = grain_mass(data%dimension, data%radius(k), density_of(config, data%material(k)))
+    end do
+  end subroutine set_masses
 
   !> Put the grains into the cells of a lattice; a box without height becomes as high as the lattice.
   subroutine place_in_lattice(seed, largest, box, data, error)
@@ -214,11 +229,18 @@ contains
     type(config_t), intent(in) :: config
     type(bodies_data_t), intent(in) :: data
     class(sample_box_t), intent(inout) :: box
-    integer :: nd
+    real(dp), allocatable :: mass(:)
+    real(dp) :: volume
+    integer :: m, nd
 
     nd = box%nd
-    box%upper(nd) = box%lower(nd) + comm%sum_real(data%mass)/density_of(config, 1)/ &
-      & (config%sample%solid_fraction*product(config%sample%box(1:nd - 1)))
+    allocate (mass(data%n))
+    volume = 0.0_dp
+    do m = 1, max(1, size(config%materials))
+      mass(:) = merge(data%mass, 0.0_dp, data%material == m)
+      volume = volume + comm%sum_real(mass)/density_of(config, m)
+    end do
+    box%upper(nd) = box%lower(nd) + volume/(config%sample%solid_fraction*product(config%sample%box(1:nd - 1)))
   end subroutine set_height
 
   !> Planes on the sides of the box that are not periodic, facing inwards: the floor, the two sides across each other axis,

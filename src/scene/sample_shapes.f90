@@ -8,6 +8,7 @@ module gravier_sample_shapes
   use gravier_shape_library, only: shape_library_t
   use gravier_shape_names, only: find_shape, shape_names
   use gravier_random_turn, only: random_turn
+  use gravier_shares, only: accumulate, kind_at
   use gravier_config_types, only: config_t, grains_config_t
   use gravier_config_names, only: count_names, get_name
   use gravier_config_laws, only: density_of
@@ -28,7 +29,7 @@ contains
     type(config_t), intent(in) :: config
     !> one shape or more
     type(shape_library_t), intent(in) :: shapes
-    !> identifiers, radii and the masses of disks or spheres are known
+    !> identifiers, radii, materials and the masses of disks or spheres are known
     type(bodies_data_t), intent(inout) :: data
     type(error_t), allocatable, intent(inout) :: error
     integer, allocatable :: number(:)
@@ -40,10 +41,10 @@ contains
     call comm%agree(error)
     if (allocated(error)) return
     do k = 1, data%n
-      data%shape(k) = number(place_of(bound, hash_uniform(config%sample%seed, data%id(k), stream_of_shapes)))
+      data%shape(k) = number(kind_at(bound, hash_uniform(config%sample%seed, data%id(k), stream_of_shapes)))
       if (data%shape(k) == 0) cycle
       call random_turn(config%sample%seed, data%id(k), stream_of_turns, data%orientation(:, k))
-      data%mass(k) = density_of(config, 1)*shapes%volume_of(data%shape(k))*data%radius(k)**data%dimension
+      data%mass(k) = density_of(config, data%material(k))*shapes%volume_of(data%shape(k))*data%radius(k)**data%dimension
     end do
   end subroutine draw_shapes
 
@@ -70,12 +71,9 @@ contains
     end do
     bound(:) = 1.0_dp
     associate (shares => grains%grain_shares)
-      if (any(shares > 0.0_dp)) bound(:) = shares(:n)/maxval(shares)
+      if (any(shares > 0.0_dp)) bound(:) = shares(:n)
     end associate
-    do k = 2, size(bound)
-      bound(k) = bound(k - 1) + bound(k)
-    end do
-    bound(:) = bound/bound(size(bound))
+    call accumulate(bound)
   end subroutine choose_shapes
 
   !> The number of a shape by its name.
@@ -93,16 +91,5 @@ contains
     if (number == 0 .and. name /= ball) call raise(error, status_input, label//" grain_shapes: '"//name// &
       & "': expected "//ball//" or one of the shapes of "//trim(config%scene%shapes)//", "//shape_names(shapes, ", "))
   end subroutine find_number
-
-  !> First place whose bound is above a number; the last one is.
-  pure integer function place_of(bound, u) result(place)
-    real(dp), intent(in) :: bound(:)
-    !> in (0, 1)
-    real(dp), intent(in) :: u
-
-    do place = 1, size(bound) - 1
-      if (bound(place) > u) return
-    end do
-  end function place_of
 
 end module gravier_sample_shapes

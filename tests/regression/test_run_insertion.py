@@ -470,7 +470,7 @@ class Insertion(RunTestCase):
             "&insertion (the 1st, 'feed') end = 0.1: expected a time later than start, here start = 0.1": {"start": 0.1, "end": 0.1},
             "&insertion (the 1st, 'feed') velocity_spread = 0.1, -0.1: expected": {"velocity_spread": [0.1, -0.1]},
             "&insertion (the 1st, 'feed') velocity = 0.1, 0.0, 1.0: expected a third component of 0": {"velocity": [0.1, 0.0, 1.0]},
-            "&insertion (the 1st, 'feed') material = 'glass': expected the name of a &material": {"material": "glass"},
+            "&insertion (the 1st, 'feed') material = 'glass': expected the name of a &material, and there is none": {"material": "glass"},
             "&insertion (the 1st, 'feed') grain_shapes = 'square': expected shapes of &scene": {"grain_shapes": "square"},
             "&insertion (the 1st, 'feed') radius_min = 0.008: expected at most radius_max, here radius_max = 0.006": {"radius_min": 0.008},
             "&insertion (the 1st, 'feed') centre = 0.0, 0.0: centre belongs to region = 'ball'": {"centre": [0.0, 0.0]},

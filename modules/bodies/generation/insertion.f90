@@ -6,6 +6,7 @@ module gravier_insertion
   use gravier_kinds, only: dp, i8
   use gravier_random_hash, only: hash_uniform
   use gravier_random_turn, only: random_turn
+  use gravier_shares, only: kind_at
   use gravier_finite, only: is_finite
   use gravier_motion, only: grain_volume
   use gravier_radius_distribution, only: radius_distribution_t
@@ -115,10 +116,7 @@ contains
     volume = grain_volume(self%nd, grain%radius)
     if (self%nd == 3) grain%turn(1) = 1.0_dp
     if (allocated(self%shape)) then
-      k = 1
-      do while (k < size(self%shape) .and. self%bound(k) <= hash_uniform(self%seed, number, self%stream(of_shape)))
-        k = k + 1
-      end do
+      k = kind_at(self%bound, hash_uniform(self%seed, number, self%stream(of_shape)))
       grain%shape = self%shape(k)
       if (grain%shape > 0) then
         volume = self%unit_volume(k)*grain%radius**self%nd

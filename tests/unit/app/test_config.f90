@@ -1282,6 +1282,9 @@ contains
     call check_vector(config%sample%box, [40.0_dp, 5.0_dp, 0.0_dp], "a box with the period along one axis")
     call accept(sample(grains // "grain_shapes = 'a, disk, b' grain_shares = 3, 1, 0.5", "shapes = 'a.shapes'"), "shapes", config)
     call check_equal(config%sample%grain_shapes, "a, disk, b", "shapes of grains")
+    call check_equal(config%sample%grain_materials, "", "default materials of grains")
+    call check_close(config%sample%material_shares(1), 0.0_dp, 0.0_dp, "default shares of materials")
+    call check_close(maxval(abs(config%sample%velocity_spread)), 0.0_dp, 0.0_dp, "default spread of velocities")
     call check_close(config%sample%grain_shares(3), 0.5_dp, 0.0_dp, "a share of grains")
   end subroutine test_sample
 
@@ -1370,19 +1373,23 @@ contains
       // "expected another one where gravity does not point down the last axis")
     call refuse(sample(made // "preparation = 'settled'", "period(2) = 1"), "&sample preparation = 'settled': " &
       // "expected another one where the last axis is periodic")
+    call refuse(sample(made // "grain_materials = 'a'"), &
+      "&sample grain_materials = 'a': expected the name of a &material, and there is none")
+    call refuse(sample(made // "velocity_spread = -1"), &
+      "&sample velocity_spread = -1: expected at most 3 finite real numbers >= 0 (m/s)")
     call refuse(sample(made // "file = ''"), &
       "&sample file = '': expected a text in quotes, not empty, at most 4096 characters")
     call refuse(sample(made // "file = 'a.csv'"), "&sample file = 'a.csv': expected a name with the ending .h5 or .hdf5")
     call refuse(sample(made // "grain_shapes = 'a'"), &
       "&sample grain_shapes = 'a': expected shapes of &scene, the path of the file that has them")
     call refuse(sample(made // "grain_shares = 1", "shapes = 'b'"), &
-      "&sample grain_shares = 1: expected it where grain_shapes names one shape to 8")
+      "&sample grain_shares = 1: expected it where grain_shapes has one name to 8")
     call refuse(sample(made // "grain_shapes = 'a,b' grain_shares = 1", "shapes = 'b'"), &
       "&sample grain_shares = 1: expected a share above 0 for each of the 2 grain_shapes")
     call refuse(sample(made // "grain_shapes = 'a' grain_shares = 1, 1", "shapes = 'b'"), &
       "&sample grain_shares = 1, 1: expected a share above 0 for each of the 1 grain_shapes")
     call refuse(sample(made // "grain_shapes = 'a,b,c,d,e,f,g,h,i' grain_shares = 1", "shapes = 'b'"), &
-      "&sample grain_shares = 1: expected it where grain_shapes names one shape to 8")
+      "&sample grain_shares = 1: expected it where grain_shapes has one name to 8")
     call refuse(sample(made // "grain_shapes = 'a' grain_shares = 9*1", "shapes = 'b'"), &
       "&sample grain_shares = 9*1: expected at most 8 finite real numbers > 0")
     call refuse(sample(made // "arrangement = 'dense'"), "&sample arrangement = 'dense': expected 'lattice' or 'loose'")
@@ -1572,7 +1579,8 @@ contains
     call check_equal(text(index(text, "&sample"):index(text, "&time") - 1), "&sample" // newline &
       // "  arrangement = 'loose'" // newline // "  preparation = 'none'" // newline // "  container = 'box'" // newline &
       // "  count = 10" // newline &
-      // "  radii = 'single'" // newline // "  radius = 0.5" // newline // "  box = 4.0, 0.0, 0.0" // newline &
+      // "  radii = 'single'" // newline // "  radius = 0.5" // newline // "  velocity = 0.0, 0.0, 0.0" // newline &
+      // "  velocity_spread = 0.0, 0.0, 0.0" // newline // "  box = 4.0, 0.0, 0.0" // newline &
       // "  solid_fraction = 0.35" // newline // "  seed = 1" // newline // "  file = 'sample.h5'" // newline &
       // "/" // newline, "a sample written back")
     call check(index(text, "&boundary") == 0, "no group of a boundary")
@@ -1627,6 +1635,8 @@ contains
     call check_round_trip(sample("count = 10 radius = 0.1 solid_fraction = 0.4", "period = 0.3"), "a periodic sample")
     call check_round_trip(sample("count = 10 radius = 0.1 box = 4 grain_shapes = 'a b' grain_shares = 1, 2.5", "shapes = 'c'"), &
       "a sample with shapes")
+    call check_round_trip(sample("count = 10 radius = 0.1 box = 4 grain_materials = 'a b' material_shares = 1, 2.5 " &
+      // "velocity = 1, 2 velocity_spread = 3") // "&material name = 'a' / &material name = 'b' /", "a mixture that moves")
     call check_round_trip(sample("count = 10 radii = 'table' radius_table = 'a' box = 4 arrangement = 'lattice' " &
       // "preparation = 'compacted' pressure = 3"), "a compacted lattice")
   end subroutine test_round_trip
