@@ -23,7 +23,7 @@ module gravier_run_log
   use gravier_region_lines, only: region_warnings
   use gravier_late_events, only: late_warnings, removal_lines, fallen_warning, forces_line
   use gravier_rounding_lines, only: rounding_warnings
-  use gravier_sample_lines, only: sample_warnings, density_warnings
+  use gravier_sample_lines, only: sample_warnings, density_warnings, falling_warnings
   use gravier_intact_bonds, only: count_bonds
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
@@ -261,23 +261,28 @@ contains
       & distance_line(simulation), "", error)
     call scale_warnings(simulation, scales, text, warnings)
     call sample_warnings(simulation, more, number)
-    warnings = warnings + number
-    text = text//more
+    call add()
     call density_warnings(simulation, scales%densities, more, number)
-    warnings = warnings + number
-    text = text//more
+    call add()
+    call falling_warnings(simulation, more, number)
+    call add()
     call inflow_warnings(simulation, more, number)
-    warnings = warnings + number
-    text = text//more
+    call add()
     call region_warnings(simulation, more, number)
-    warnings = warnings + number
-    text = text//more
+    call add()
     call late_warnings(simulation, more, number)
-    warnings = warnings + number
-    text = text//more
+    call add()
     call rounding_warnings(simulation, more, number)
-    warnings = warnings + number
-    call write_lines(self, text//more, "", error)
+    call add()
+    call write_lines(self, text, "", error)
+
+  contains
+
+    subroutine add()
+      text = text//more
+      warnings = warnings + number
+    end subroutine add
+
   end subroutine run_log_write_scales
 
   !> What is kept in memory, array by array, and what a rank holds at most. Collective.

@@ -1,5 +1,5 @@
 !> What the log says of the grains of a scene before a run: of a sample, that nobody has prepared it; of those of a bodies file,
-!> that they have other masses than the case says.
+!> that they have other masses than the case says; of those that nothing holds, that they fall.
 module gravier_sample_lines
   use gravier_kinds, only: dp
   use gravier_text, only: to_text
@@ -7,7 +7,7 @@ module gravier_sample_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: sample_warnings, density_warnings
+  public :: sample_warnings, density_warnings, falling_warnings
 
   !> part of a density by which masses of a file may differ from it
   real(dp), parameter :: of_masses = 0.01_dp
@@ -63,5 +63,30 @@ contains
       end do
     end associate
   end subroutine density_warnings
+
+  !> A warning, a line ended by a newline, and the number of warnings: the scene repeats itself along gravity and has no boundary, so
+  !> that all grains fall together, without an end.
+  subroutine falling_warnings(simulation, text, number)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    character(len=*), parameter :: axes = "xyz"
+    integer :: d, nd
+
+    text = ""
+    number = 0
+    associate (scene => simulation%config%scene)
+      nd = scene%dimension
+      if (size(simulation%decomposition%boundaries) > 0 .or. scene%gravity_table /= "") return
+      do d = 1, nd
+        if (.not. (scene%period(d) > 0.0_dp .and. abs(scene%gravity(d)) > 0.0_dp)) cycle
+        number = 1
+        text = "warning     nothing holds the grains against gravity along "//axes(d:d)//", where the scene is periodic and "// &
+          & "has no boundary: all of them fall together. &scene gravity = "//trim(merge("0, 0   ", "0, 0, 0", nd == 2))// &
+          & " switches gravity off"//new_line("a")
+        return
+      end do
+    end associate
+  end subroutine falling_warnings
 
 end module gravier_sample_lines

@@ -105,6 +105,28 @@ class Scales(RunTestCase):
                     text = self.check_case(case, ranks=ranks, files={"b.csv": bodies, "s.shapes": shapes})
                     self.assertEqual([line[12:] for line in self.warnings(text)], wanted)
 
+    def test_grains_that_nothing_holds(self):
+        """Gravity along a period without any boundary is warned of. A boundary, gravity along another axis, a table and gravity that is off are not."""
+        sample = {"scene": {"bodies": "sample", "dimension": 2, "period": [0.0, 0.2]},
+                  "sample": {"count": 20, "radius": 0.005, "box": [0.2, 0.2], "container": "box", "arrangement": "lattice"}, "time": {"step": 1e-4, "steps": 1}}
+        files = {"b.csv": "id,x,y,radius\n1,0.1,0.1,0.01\n", "space.csv": "id,x,y,z,radius\n1,0.1,0.1,0.1,0.01\n", "g.csv": "time,gx,gy\n0,0,-1\n1,0,-1\n"}
+        free = {"scene": {"bodies": "file", "bodies_file": "b.csv", "dimension": 2, "period": [0.2, 0.2]}, "time": {"step": 1e-4, "steps": 1}}
+        space = merged(free, {"scene": {"dimension": 3, "period": [0.0, 0.0, 0.2], "bodies_file": "space.csv"}})
+        words = "nothing holds the grains against gravity along"
+        for title, case, wanted in (
+                ("both axes", free, f"{words} y, where the scene is periodic and has no boundary: all of them fall together. "
+                                    "&scene gravity = 0, 0 switches gravity off"),
+                ("space", space, f"{words} z, where the scene is periodic and has no boundary: all of them fall together. "
+                                 "&scene gravity = 0, 0, 0 switches gravity off"),
+                ("across", merged(free, {"scene": {"period": [0.2, 0.0]}}), None),
+                ("planes of a sample", sample, None),
+                ("boundary", merged(free, {"boundary": [{"shape": "segment", "point": [0.0, 0.05], "end": [0.2, 0.05]}]}), None),
+                ("table", merged(free, {"scene": {"gravity_table": "g.csv"}}), None),
+                ("off", merged(free, {"scene": {"gravity": [0.0, 0.0]}}), None)):
+            with self.subTest(title):
+                found = [line[12:] for line in self.warnings(self.check_case(case, files=files)) if words in line]
+                self.assertEqual(found, [wanted] if wanted else [])
+
     def test_unit_of_lengths(self):
         """Grains of metres are large: millimetres that are meant as such are seen."""
         large = self.check_case(LATTICE, {"scene": {"radius_min": 4.0, "radius_max": 6.0}, "time": {"step": 0.01}})
