@@ -6,6 +6,8 @@ module gravier_final_bodies
   use gravier_bodies_data, only: bodies_data_t, allocate_bodies, allocate_shapes, allocate_walls
   use gravier_bodies_hdf5, only: write_bodies_hdf5, holds_bodies
   use gravier_contact_forces, only: list_forces
+  use gravier_surface_registry, only: wall_of_bodies
+  use gravier_scene_boundaries, only: wall_name
   use gravier_simulation, only: simulation_t, step_figures_t
   use gravier_output, only: output_t, of_end
   implicit none
@@ -62,10 +64,10 @@ contains
     call write_final_bodies(simulation, self%path, simulation%config%output%final_forces, "gravier", error)
   end subroutine final_bodies_write
 
-  !> Write grains with their shapes, the walls that came with them, the period and, on request, the contacts that press, with
-  !> their forces. Boundaries of the input file are not written: the next input file has its own. Contacts name them. A run that
-  !> goes on from a checkpoint and makes no step knows no forces: a file that holds its state already is left as it is.
-  !> Collective; errors are the same on all ranks.
+  !> Write grains with their shapes, the walls that came with them, where they are now, the period and, on request, the contacts
+  !> that press, with their forces. Other boundaries of the input file are not written: the next input file has its own. Contacts
+  !> name them. A run that goes on from a checkpoint and makes no step knows no forces: a file that holds its state already is left
+  !> as it is. Collective; errors are the same on all ranks.
   subroutine write_final_bodies(simulation, path, with_forces, made_by, error)
     type(simulation_t), intent(in) :: simulation
     character(len=*), intent(in) :: path
@@ -75,6 +77,7 @@ contains
     character(len=*), intent(in) :: made_by
     type(error_t), allocatable, intent(inout) :: error
     type(bodies_data_t) :: data
+    integer, allocatable :: walls(:)
     integer :: s, k, n, nd, nv, w
 
     if (allocated(error)) return
@@ -83,7 +86,8 @@ contains
       nv = decomposition%nv
       call allocate_bodies(data, nd, sum(decomposition%owned%n), .true., path, error)
       if (decomposition%no > 0) call allocate_shapes(data, path, error)
-      call allocate_walls(data, nd, simulation%n_walls, path, error)
+      call find_walls(simulation, walls)
+      call allocate_walls(data, nd, size(walls), path, error)
       call simulation%comm%agree(error)
       if (allocated(error)) return
       data%made_by = made_by
@@ -107,10 +111,12 @@ contains
           end do
         end associate
       end do
-      do w = 1, simulation%n_walls
-        data%wall_id(w) = decomposition%boundaries(w)%id
-        data%wall_point(:, w) = decomposition%boundaries(w)%surface%point(1:nd)
-        data%wall_normal(:, w) = decomposition%boundaries(w)%surface%axis(1:nd)
+      do w = 1, size(walls)
+        associate (wall => decomposition%boundaries(walls(w)))
+          data%wall_id(w) = wall%id
+          data%wall_point(:, w) = wall%surface%point(1:nd)
+          data%wall_normal(:, w) = wall%surface%axis(1:nd)
+        end associate
       end do
       data%has_box = decomposition%period%on()
       data%origin(:) = decomposition%period%origin
@@ -124,8 +130,35 @@ contains
       else if (simulation%restarted) then
         if (holds_bodies(simulation%comm, path, decomposition%shapes, data)) return
       end if
+      do w = 1, size(walls)
+        associate (wall => decomposition%boundaries(walls(w)))
+          call data%contacts%rename_boundary(wall%name, wall_name(wall%id))
+        end associate
+      end do
       call write_bodies_hdf5(simulation%comm, path, data, error, decomposition%shapes)
     end associate
   end subroutine write_final_bodies
+
+  !> Numbers of the boundaries that are walls of the bodies: those that no group of the case is, and of those that one is what has
+  !> not been removed.
+  pure subroutine find_walls(simulation, walls)
+    type(simulation_t), intent(in) :: simulation
+    integer, allocatable, intent(out) :: walls(:)
+    logical :: is_wall(size(simulation%decomposition%boundaries))
+    integer :: b, n
+
+    n = simulation%n_walls
+    is_wall(:) = simulation%decomposition%boundaries%present
+    do b = 1, size(simulation%config%boundaries)
+      if (simulation%config%boundaries(b)%shape /= wall_of_bodies) is_wall(n + b) = .false.
+    end do
+    allocate (walls(count(is_wall)))
+    n = 0
+    do b = 1, size(is_wall)
+      if (.not. is_wall(b)) cycle
+      n = n + 1
+      walls(n) = b
+    end do
+  end subroutine find_walls
 
 end module gravier_final_bodies

@@ -64,8 +64,8 @@ contains
     end associate
   end subroutine density_warnings
 
-  !> A warning, a line ended by a newline, and the number of warnings: the scene repeats itself along gravity and has no boundary, so
-  !> that all grains fall together, without an end.
+  !> A warning, a line ended by a newline, and the number of warnings: the scene repeats itself along gravity and has no boundary,
+  !> so that all grains fall together, without an end.
   subroutine falling_warnings(simulation, text, number)
     type(simulation_t), intent(in) :: simulation
     character(len=:), allocatable, intent(out) :: text

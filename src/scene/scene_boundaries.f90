@@ -16,7 +16,7 @@ module gravier_scene_boundaries
   use gravier_config_laws, only: material_number
   implicit none
   private
-  public :: make_boundaries, check_pressures, check_pressed
+  public :: make_boundaries, wall_name, check_pressures, check_pressed
 
   !> cosine of the angle to an axis within which the normal of a wall lies along it
   real(dp), parameter :: along_axis = 0.999_dp
@@ -169,9 +169,13 @@ contains
       w = k
     end do
     if (found == 1) return
-    if (walls == "") walls = " none"
+    if (walls == "") then
+      walls = "expected another shape, since the bodies bring no walls"
+    else
+      walls = to_text(found)//" walls of the bodies are meant; expected one of"//walls
+    end if
     call raise(error, status_input, config%file//": &boundary '"//trim(config%boundaries(b)%name)//"' wall = '"// &
-      & trim(config%boundaries(b)%wall)//"': "//to_text(found)//" walls of the bodies are meant; expected one of"//walls)
+      & trim(config%boundaries(b)%wall)//"': "//walls)
   end subroutine find_wall
 
   !> The side of a wall with a normal towards the free side, in parentheses; nothing of one that leans.

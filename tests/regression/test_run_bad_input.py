@@ -209,6 +209,8 @@ FILES = [
                                 "boundary": {"shape": "wall", "wall": "-x"},
                                 "insertion": {"lower": [0.0, 0.0], "upper": [1.0, 1.0], "rate": 1.0, "radius": 0.1}}),
      ("another shape where bodies = 'none'",)),
+    ("wall of a lattice without walls", case({"scene": {"period": [1.0, 1.0]}, "boundary": {"shape": "wall", "wall": "-x"}}),
+     ("boundary 'boundary 1' wall = '-x': expected another shape, since the bodies bring no walls",)),
     # the magnitude
     key("time", "step", "1e-200", "expected a number from 1e-30 to 1e30"),
     key("time", "step", "1e31", "expected a number of at most 1e30 in size"),

@@ -355,6 +355,40 @@ class GivenForces(RunTestCase):
         self.assertNotIn(left, results["/steps/20/contacts/antagonist"])
         self.assertIn(floor, results["/steps/20/contacts/antagonist"])
 
+    def test_walls_stay_with_the_bodies(self):
+        """Walls that a case has taken are in the bodies file that its run leaves, and in one that Python makes: where the run has left them, under
+        their identifiers, with the forces on them, and without the one that it has removed. The next run may take them again or not."""
+        path, _ = self.settle()
+        with h5py.File(path) as file:
+            walls = {tuple(normal): int(number) for number, normal in zip(file["walls/id"][:], file["walls/normal"][:])}
+        left, right, floor = walls[1.0, 0.0], walls[-1.0, 0.0], walls[0.0, 1.0]
+        scene = {"scene": {"dimension": 2, "friction": 0.3, "alert_distance": 0.003}, "time": {"steps": 21},
+                 "output": {"every": 7, "final_bodies": True, "final_forces": True}}
+        taken = {"boundary": [{"name": "gate", "shape": "wall", "wall": "+x", "velocity": [-1e-4, 0.0]},
+                              {"name": "ramp", "shape": "wall", "wall": str(floor), "rotation": [-0.01]},
+                              {"name": "gone", "shape": "wall", "wall": "-x", "remove_at": 10 * STEP}]}
+        run = self.start("taken_walls", merged(scene, taken), path)
+        self.assert_status(run, 0)
+        made = package.Run(run.path("results"))
+        package.write_bodies(made, self.here("made.h5"))
+        package.write_bodies(made, self.here("before.h5"), 7)
+        turn, far = -0.01 * 21 * STEP, 0.25 - 1e-4 * 21 * STEP
+        for file in (run.path("results", "final_bodies.h5"), self.here("made.h5")):
+            with h5py.File(file) as found:
+                self.assertEqual(sorted(found["walls/id"][:]), sorted([right, floor]))
+                rows = {number: row for row, number in enumerate(found["walls/id"][:])}
+                np.testing.assert_allclose(found["walls/point"][rows[right]], [far, 0.0], rtol=1e-12)
+                np.testing.assert_allclose(found["walls/normal"][rows[floor]], [-np.sin(turn), np.cos(turn)], rtol=1e-12)
+                self.assertLessEqual({f"wall {right}", f"wall {floor}"}, set(found["contacts/boundaries"][0].decode().split("\n")))
+            for title, groups in (("left", {}), ("again", {"boundary": [{"name": "lid", "shape": "wall", "wall": "+x"}]})):
+                again = self.start(f"{title} {os.path.basename(file)}", merged(scene, {"time": {"steps": 1}}, groups), file)
+                self.assert_status(again, 0)
+                self.assertRegex(again.stdout, r"start       from forces of the bodies file: (\d+) of its \1 contacts touch in the first step")
+                rows = package.Run(again.path("results")).boundaries()
+                self.assertEqual(dict(zip(rows.id, rows.name)), {right: "lid" if groups else f"wall {right}", floor: f"wall {floor}"})
+        with h5py.File(self.here("before.h5")) as found:
+            self.assertEqual(sorted(found["walls/id"][:]), sorted([left, right, floor]))
+
     def test_shapes(self):
         """Places tell the points of a pair from each other: two blocks on a table of which one stands on one edge more than on the other."""
         write(self.here("blocks.shapes"), "shape block\nrounding 0.001\npolygon -0.1 -0.05 0.1 -0.05 0.1 0.05 -0.1 0.05\n")

@@ -48,10 +48,20 @@ def given_contacts(run, step=None):
     return {name: values[bears] for name, values in found.items()}, list(boundaries.name)
 
 
+def walls_of_bodies(run, boundaries, step=None):
+    """Rows of the boundaries of a state that are walls of the bodies: those that no &boundary is, and of those that one is what has not been
+    removed."""
+    groups = run.case.get("boundary", [])
+    own = len(boundaries) - len(groups)
+    # a boundary is removed in the first step that begins at its time or later
+    begun = run.time(step) - (1.0 - 1e-6) * run.time_step()
+    return [*range(own), *(own + k for k, group in enumerate(groups) if group.get("shape") == "wall" and group.get("remove_at", np.inf) > begun)]
+
+
 def write_bodies(run, path, step=None):
-    """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries of the input
-    and periods are those of its input; walls and periods of a bodies file are in this one, and the edges of a cell that moves with their
-    velocities. A file that is there is replaced where this function has made it."""
+    """Write a state of a run of disks or spheres as a bodies file with the forces of its contacts, for another run. Boundaries and periods of
+    the input of that run are its own; walls of the bodies, where they are in this state, and periods of a bodies file are in this one, and
+    the edges of a cell that moves with their velocities. A file that is there is replaced where this function has made it."""
     claim_bodies_file(path, PROGRAM, run.path)
     if run.shapes() or any(boundary.get("shape") == "grains" for boundary in run.case.get("boundary", [])):
         raise ResultsError(f"{run.path}: bodies with shapes or grains glued to boundaries: expected disks or spheres; final_forces = .true. of "
@@ -66,7 +76,8 @@ def write_bodies(run, path, step=None):
         spins = 2 * run.dimension - 3
         spin = bodies.spin if bodies.spin.size else np.zeros((len(bodies), spins))
         file["bodies/velocity"] = np.concatenate([bodies.velocity, spin], axis=1)
-        walls = [k for k, name in enumerate(boundaries.name) if name == f"wall {boundaries.id[k]}"]
+        walls = walls_of_bodies(run, boundaries, step)
+        names = [f"wall {boundaries.id[k]}" if k in walls else name for k, name in enumerate(names)]
         if walls:
             file["walls/id"], file["walls/point"], file["walls/normal"] = (boundaries[key][walls] for key in ("id", "position", "normal"))
         if cell is not None:
