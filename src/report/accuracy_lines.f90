@@ -129,7 +129,7 @@ contains
       end do
       if (n > 0) text = ", "//percent(checks(worst)%share())//" on "//name_of(worst)
       if (n > 1) text = text//", "//percent(checks(best)%share())//" on "//name_of(best)
-      if (n > 2) text = text//", on others between these"
+      if (n > 2) text = text//", on the others between the two"
     end associate
 
   contains
@@ -247,7 +247,7 @@ contains
 
     name = "the mean radius"
     if (simulation%effects%shapes) name = "half of the mean thickness"
-    if (simulation%inflow%exists()) name = name//", the smallest of the start and of what enters"
+    if (simulation%inflow%exists()) name = name//" of the smallest grains, those of the start or of an &insertion"
   end function mean_size_name
 
   !> A fraction as people write it; what is not 0 is not written as 0.

@@ -66,9 +66,9 @@ contains
     call comm%sum_counts(counts)
     text = "solver      "//counted(work%solves, "solve")//", "//counted(work%iterations, "iteration")//", "// &
       & counted(work%sweeps, "sweep")//", "//counted(counts(1), "contact relaxation")//newline// &
-      & "interface   "//to_text(work%interface_solves)//" exchanges or interface solves with "// &
-      & to_text(work%interface_iterations)//" iterations; subdomain matrices: "//to_text(counts(2))//" analyses, "// &
-      & to_text(counts(3))//" factorisations"//newline
+      & "interface   "//to_text(work%interface_solves)//" exchanges between subdomains or solves of the interface, "// &
+      & to_text(work%interface_iterations)//" iterations of conjugate gradients; matrices of subdomains: "//to_text(counts(2))// &
+      & " analyses, "//to_text(counts(3))//" factorisations"//newline
     if (simulation%fallback%taken > 0) text = text//"fallback    "//fallback_text(simulation)//newline
     if (simulation%config%solver%sleeping) text = text//"sleeping    "//to_text(simulation%tally%slept)// &
       & " contacts of bodies asleep were left out, summed over all steps; "// &

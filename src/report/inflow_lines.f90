@@ -160,9 +160,13 @@ contains
     else if (mass > 0.0_dp) then
       text = text//", *** "//to_text(mass, 3)//" kg less than its rate owes: "//why_behind(insertion, "grains")
     else if (insertion%is_complete()) then
-      text = text//", all that its bounds allow"
+      if (insertion%entered >= insertion%most_grains) then
+        text = text//", its count is reached"
+      else
+        text = text//", its mass has room for no other grain"
+      end if
     else if (insertion%rate < huge(1.0_dp) .or. insertion%mass_rate < huge(1.0_dp)) then
-      text = text//", all that its rate owes"
+      text = text//", as many as its rate asks for"
     end if
     if (insertion%put_off > 0) text = text//"; grains were put off in "//counted(insertion%put_off, "step")
     if (insertion%held_back > 0) text = text//"; more than "//to_text(most_a_step)//" were to enter in "// &

@@ -119,13 +119,12 @@ contains
     call simulation%method%held(simulation%problem%nc, simulation%problem%nv, held)
     call describe_contact(simulation, held, items(1))
     items(2)%name = "near pair"
-    call items(2)%add("candidate", 4, 1)
-    call items(2)%add("antagonist", 4, 1)
-    call items(2)%add("shift", 4, merge(1, 0, simulation%decomposition%ni > 0))
+    call items(2)%add("pair", 4, 2)
+    call items(2)%add("periods between them", 4, merge(1, 0, simulation%decomposition%ni > 0))
     call items(2)%add("impulse", 8, simulation%halo%memory%n_impulse)
-    call items(2)%add("elongation", 8, simulation%halo%memory%n_spring)
-    call items(2)%add("watched", 4, merge(1, 0, simulation%halo%memory%touch_row > 0))
-    call items(2)%add("state", 4, simulation%halo%memory%n_states())
+    call items(2)%add("elongation of its spring", 8, simulation%halo%memory%n_spring)
+    call items(2)%add("whether a body is awake", 4, merge(1, 0, simulation%halo%memory%touch_row > 0))
+    call items(2)%add("state of its law", 4, simulation%halo%memory%n_states())
     call describe_body(simulation, held, items(3))
     items(4)%name = "grain seen, ghosts included"
     call add_grain(simulation, items(4))
@@ -144,19 +143,15 @@ contains
     associate (kernels => simulation%problem%kernels)
       item%name = "contact"
       call item%add("pair", 4, 2)
-      call item%add("hot", 8, kernels%nh)
+      call item%add("coefficients of sweeps", 8, kernels%nh)
       call item%add("impulse", 8, kernels%nc)
       if (simulation%physics%laws%attracts) call item%add("attraction", 8, 1)
       if (simulation%physics%laws%yields) call item%add("spring", 8, storage_size(spring_step_t())/64)
       call item%add("gap", 8, 1)
-      call item%add("source", 4, 1)
+      call item%add("place in the list of pairs", 4, 1)
       ! a projection of places borrows these
-      if (simulation%overlap_allowed < huge(1.0_dp)) then
-        call item%add("law of projections", 8, merge(2, 1, kernels%nf > 1))
-        call item%add("impulse of projections", 8, kernels%nc)
-        call item%add("velocity of projections", 8, kernels%nc)
-        call item%add("blocks of projections", 2, 1)
-      end if
+      if (simulation%overlap_allowed < huge(1.0_dp)) &
+        & call item%add("projections of overlaps", 2, 4*(merge(2, 1, kernels%nf > 1) + 2*kernels%nc) + 1)
       call add_held(item, held, of_contacts=.true.)
     end associate
   end subroutine describe_contact
@@ -170,19 +165,19 @@ contains
     associate (kernels => simulation%problem%kernels)
       item%name = "body in contact, in each subdomain"
       call item%add("id", 8, 1)
-      call item%add("owned", 4, 1)
-      call item%add("place", 4, 1)
-      call item%add("multiplicity", 4, 1)
+      call item%add("subdomain that owns it", 4, 1)
+      call item%add("place among those owned", 4, 1)
+      call item%add("number of subdomains that share it", 4, 1)
       call item%add("radius", 8, 1)
-      call item%add("v_free", 8, kernels%nv)
-      if (simulation%physics%laws%attracts) call item%add("attraction_load", 8, kernels%nv)
-      call item%add("velocity", 8, kernels%nv)
-      call item%add("v_global", 8, kernels%nv)
-      call item%add("reaction", 8, kernels%nv)
+      call item%add("velocity without contacts", 8, kernels%nv)
+      if (simulation%physics%laws%attracts) call item%add("impulses of attractions", 8, kernels%nv)
+      call item%add("velocity in the subdomain", 8, kernels%nv)
+      call item%add("velocity of the whole body", 8, kernels%nv)
+      call item%add("sum of impulses", 8, kernels%nv)
       call add_held(item, held, of_contacts=.false.)
-      call item%add("inverse_mass", 8, kernels%nw)
-      call item%add("weight", 8, kernels%nw)
-      if (simulation%overlap_allowed < huge(1.0_dp)) call item%add("touched by projections", 4, 1)
+      call item%add("inverse mass", 8, kernels%nw)
+      call item%add("inverse mass of its part", 8, kernels%nw)
+      if (simulation%overlap_allowed < huge(1.0_dp)) call item%add("projections of overlaps", 4, 1)
     end associate
   end subroutine describe_body
 
@@ -205,17 +200,25 @@ contains
     type(simulation_t), intent(in) :: simulation
     type(item_t), intent(inout) :: item
     type(body_layout_t) :: layout
+    !> fields that sleeping has
+    character(len=*), parameter :: of_sleep(5) = [character(len=8) :: "rest", "wakes_at", "held", "stirred", "wandered"]
     character(len=:), allocatable :: name
-    integer :: f, bytes, entries
+    integer :: f, bytes, entries, sleep
 
     layout = simulation%decomposition%layout()
     f = 0
+    sleep = 0
     do
       f = f + 1
       call layout%describe_field(f, name, bytes, entries)
       if (len(name) == 0) exit
-      call item%add(name, bytes, entries)
+      if (any(of_sleep == name)) then
+        sleep = sleep + bytes*entries
+      else
+        call item%add(name, bytes, entries)
+      end if
     end do
+    call item%add("sleep", 1, sleep)
   end subroutine add_grain
 
   !> Add an array of so many entries an item; one without entries is not kept at all.

@@ -23,7 +23,7 @@ module gravier_run_log
   use gravier_region_lines, only: region_warnings
   use gravier_late_events, only: late_warnings, removal_lines, fallen_warning, forces_line
   use gravier_rounding_lines, only: rounding_warnings
-  use gravier_sample_lines, only: sample_warnings, density_warnings, falling_warnings
+  use gravier_sample_lines, only: grain_warnings
   use gravier_intact_bonds, only: count_bonds
   use gravier_run_tally, only: relative_error
   use gravier_accuracy_lines, only: accuracy_lines, goal_name
@@ -260,11 +260,7 @@ contains
     if (lines) call write_lines(self, scale_lines(simulation, scales)//error_scale_line(simulation)// &
       & distance_line(simulation), "", error)
     call scale_warnings(simulation, scales, text, warnings)
-    call sample_warnings(simulation, more, number)
-    call add()
-    call density_warnings(simulation, scales%densities, more, number)
-    call add()
-    call falling_warnings(simulation, more, number)
+    call grain_warnings(simulation, scales%densities, more, number)
     call add()
     call inflow_warnings(simulation, more, number)
     call add()

@@ -28,6 +28,8 @@ module gravier_run_summary
   real(dp), parameter :: deep = 0.1_dp
   !> contacts of rank 0 below which more ranks do not pay
   integer(i8), parameter :: contacts_a_rank = 5000
+  !> part of the run above which neighbour lists that hardly last a step are worth a word
+  real(dp), parameter :: much = 0.2_dp
   !> velocity error over its scale that a looser goal may lead to
   real(dp), parameter :: loosest = 0.1_dp
   !> part of the run that a rank waits for the slowest one in the mean, from which on uneven subdomains are named
@@ -330,6 +332,7 @@ contains
     !> seconds of sweeps of the slowest rank over the mean
     real(dp), intent(in) :: slowest
     character(len=:), allocatable :: text, balancing
+    type(method_features_t) :: features
     real(dp) :: half, shared, lost, rest
 
     half = 0.5_dp*seconds
@@ -370,10 +373,16 @@ contains
         text = "the interface takes most of it: fewer &decomposition subdomains, now "// &
           & to_text(simulation%decomposition%n_subdomains)//", on fewer ranks"
       else if (phases(phase_neighbourhood) > half) then
-        text = "neighbour lists take most of it: a larger &scene skin lets them last longer"
+        text = "neighbour lists take most of it: "//skin_text(simulation)
+      else if (phases(phase_neighbourhood) > much*seconds .and. 2*simulation%halo%builds > simulation%tally%steps) then
+        text = "no change of one key suffices; neighbour lists, built in "//to_text(simulation%halo%builds)//" of "// &
+          & counted(simulation%tally%steps, "step")//", take "//percent(phases(phase_neighbourhood)/seconds)//": "// &
+          & skin_text(simulation)
       else if (contacts_of(simulation) >= contacts_a_rank) then
         text = "twice the ranks, now "//to_text(simulation%comm%size)//", with as many &decomposition subdomains or more, now "// &
           & to_text(simulation%decomposition%n_subdomains)
+        features = features_of(trim(config%solver%method))
+        if (.not. features%decomposes) text = text//", by a &solver method that has subdomains, such as 'nscdd'"
       else if (may_loosen(simulation)) then
         text = "no change of one key suffices; a longer &time step makes fewer steps, at the price of accuracy"
       else
@@ -381,6 +390,14 @@ contains
       end if
     end associate
   end function halving_text
+
+  !> What lets neighbour lists last longer.
+  function skin_text(simulation) result(text)
+    type(simulation_t), intent(in) :: simulation
+    character(len=:), allocatable :: text
+
+    text = "a larger &scene skin, now "//to_text(simulation%decomposition%rule%skin, 3)//" m, lets them last longer"
+  end function skin_text
 
   !> What evens out the work of the ranks where they wait for the slowest one; empty where they hardly wait, or nothing is known to.
   pure function balancing_text(config, waiting) result(text)

@@ -7,7 +7,7 @@ module gravier_sample_lines
   use gravier_simulation, only: simulation_t
   implicit none
   private
-  public :: sample_warnings, density_warnings, falling_warnings
+  public :: grain_warnings
 
   !> part of a density by which masses of a file may differ from it
   real(dp), parameter :: of_masses = 0.01_dp
@@ -15,6 +15,23 @@ module gravier_sample_lines
   integer, parameter :: digits = 3
 
 contains
+
+  !> Warnings, each a line ended by a newline, and their number.
+  subroutine grain_warnings(simulation, densities, text, number)
+    type(simulation_t), intent(in) :: simulation
+    !> of the materials by the masses of a bodies file (materials, at least one), 0 where it gives none [kg/m^3, kg/m^2 in 2D]
+    real(dp), intent(in) :: densities(:)
+    character(len=:), allocatable, intent(out) :: text
+    integer, intent(out) :: number
+    character(len=:), allocatable :: of_density, of_fall
+    integer :: more(2)
+
+    call sample_warnings(simulation, text, number)
+    call density_warnings(simulation, densities, of_density, more(1))
+    call falling_warnings(simulation, of_fall, more(2))
+    text = text//of_density//of_fall
+    number = number + sum(more)
+  end subroutine grain_warnings
 
   !> A warning, a line ended by a newline, and the number of warnings: a sample that is to be prepared, which gravier_sample does
   !> and a run does not.

@@ -30,13 +30,13 @@ contains
       bodies = ""
       do m = 2, n_multiplicities
         if (interface_statistics%multiplicity(m) == 0) cycle
-        bodies = bodies//", "//to_text(m)//trim(merge("+", " ", m == n_multiplicities))//": "// &
-          & to_text(interface_statistics%multiplicity(m))
+        bodies = bodies//", "//to_text(interface_statistics%multiplicity(m))//" in "//to_text(m)// &
+          & trim(merge(" or more", "        ", m == n_multiplicities))//" subdomains"
       end do
-      if (interface_statistics%bodies == 0) bodies = ", 1: all"
+      if (bodies /= "") bodies = " ("//bodies(3:)//")"
       text = text//", "//to_text(interface_statistics%least_contacts)//" to "// &
         & to_text(interface_statistics%most_contacts)//" a subdomain; interface: "//to_text(interface_statistics%bodies)// &
-        & " bodies, "//to_text(interface_statistics%interactions)//" interactions; bodies by multiplicity "//bodies(3:)//newline
+        & " bodies"//bodies//", "//to_text(interface_statistics%interactions)//" interactions"//newline
     end associate
     if (figures%interface_statistics%neighbours > 0) text = text//"exchange    "//exchange_text(figures%interface_statistics, &
       & subdomains)//newline

@@ -46,6 +46,10 @@ contains
 
     why = ""
     if (rests(simulation)) then
+      if (simulation%n_grains == simulation%n_glued) then
+        why = "no grain is left"
+        return
+      end if
       why = "the kinetic energy of the grains, without spins of disks and spheres, was at most "// &
         & to_text(simulation%rest_energy, 3)//" J in "//to_text(steps_at_rest)//" steps"
       if (simulation%inflow%is_blocked(simulation%time)) why = why//", and grains that are still to enter found no place"

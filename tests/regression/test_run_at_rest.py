@@ -114,6 +114,18 @@ class AtRest(RunTestCase):
             self.assertIn("at rest     after step 10 of 100: the kinetic energy of the grains, without spins of disks and spheres, was at most", run.stdout)
             self.assertEqual("; boundary 'lid' still moves" in run.stdout, told, run.stdout[-600:])
 
+    def test_no_grain_is_left(self):
+        """A scene that is empty ends with these words, and not with the energy of no grain."""
+        place = self.here("empties")
+        os.makedirs(place)
+        write(os.path.join(place, "balls.csv"), "id,x,y,radius\n1,0,0.01,0.01\n2,0.1,0.02,0.01\n")
+        run = run_case({"scene": {"dimension": 2, "bodies": "file", "bodies_file": "balls.csv"},
+                        "boundary": [{"shape": "outlet", "point": [0.0, -0.1], "normal": [0.0, 1.0]}],
+                        "time": {"step": 1e-3, "steps": 1000, "rest_energy": LOW}, "output": {"every": 0}}, directory=place)
+        self.assert_status(run, 0)
+        self.assertRegex(run.stdout, r"\nat rest     after step \d+ of 1000: no grain is left")
+        self.assertEqual(run.history()["grains"][-1], 0)
+
     def test_a_ball_at_its_apex_is_not_at_rest(self):
         """It is slow for some steps of each bounce, which do not add up."""
         place = self.here("ball")

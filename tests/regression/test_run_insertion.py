@@ -98,7 +98,7 @@ class Insertion(RunTestCase):
         np.testing.assert_array_equal(np.cumsum(self.history["entered"]), np.floor(333.0 * self.history["time"] + 1e-6))
         np.testing.assert_array_equal(self.history["grains"], np.cumsum(self.history["entered"]))
         self.assertIn("insertion   'feed': 79 grains of", self.straight.stdout)
-        self.assertIn("all that its rate owes", self.straight.stdout)
+        self.assertIn("as many as its rate asks for", self.straight.stdout)
 
     def test_mass_by_the_rate(self):
         run = run_case(changed(rate=None, mass_rate=50.0), directory=self.here("mass"))
@@ -229,8 +229,8 @@ class Insertion(RunTestCase):
                                       r"that lets grains in\n")
         checked = run_case(changed(mass=0.1), directory=self.here("none checked"), options=["--check"])
         self.assertIn("insertion 'feed': about 0 grains enter until the end, taking at least", checked.stdout)
-        for each in (run, limited):
-            self.assertIn("all that its bounds allow", each.stdout)
+        for each, end in ((run, "its count is reached"), (limited, "its mass has room for no other grain")):
+            self.assertRegex(each.stdout, rf"kg entered, {end}[\n;]")
             self.assertNotIn("fewer than its rate owes", each.stdout)
 
     def test_most_in_a_step(self):
@@ -241,7 +241,7 @@ class Insertion(RunTestCase):
                                             "output": {"every": 0, "energy": False, "checkpoint_every": 0}})
 
         for steps, line in ((2, "*** 800 fewer than its rate owes: at most 1000 enter in a step; more than 1000 were to enter in 2 steps"),
-                            (4, "all that its bounds allow; more than 1000 were to enter in 3 steps")):
+                            (4, "its count is reached; more than 1000 were to enter in 3 steps")):
             with self.subTest(steps=steps):
                 run = run_case(still(steps, 10.5), directory=self.here(f"most{steps}"))
                 self.assert_status(run, 0)
@@ -271,7 +271,7 @@ class Insertion(RunTestCase):
                 "output": {"every": 0, "energy": True}}
         run = run_case(merged(case, {"insertion": [{**feed, "count": 14}]}), directory=self.here("rested"))
         self.assert_status(run, 0)
-        self.assertRegex(run.stdout, r"insertion   'feed': 14 grains of \S+ kg entered, all that its bounds allow; grains were put off in \d+ steps\n")
+        self.assertRegex(run.stdout, r"insertion   'feed': 14 grains of \S+ kg entered, its count is reached; grains were put off in \d+ steps\n")
         self.assertRegex(run.stdout, r"at rest     after step \d+ of 2500: the kinetic energy of the grains, without spins of disks and spheres, was at most 1.00E-03 J in 10 steps\n")
         full = run_case(merged(case, {"insertion": [{**feed, "rate": 200.0, "count": 50}]}), directory=self.here("full"))
         self.assert_status(full, 0)
@@ -301,7 +301,7 @@ class Insertion(RunTestCase):
         self.assertEqual(entered[time < 0.05].sum(), 0)
         self.assertEqual(entered[time > 0.1 + 1e-9].sum(), 0)
         self.assertEqual(entered.sum(), 16)
-        self.assertIn("all that its rate owes", run.stdout)
+        self.assertIn("as many as its rate asks for", run.stdout)
 
     def test_several_with_grains_at_the_start(self):
         """Identifiers follow on those of the file; two insertions in one region do not overlap; the outlet takes grains out for good."""

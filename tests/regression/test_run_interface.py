@@ -1,5 +1,6 @@
 """What scripts and users rely on: options of the command, exit statuses, names, shapes and types in the results."""
 import os
+import re
 import unittest
 
 import h5py
@@ -70,13 +71,18 @@ class Commands(RunTestCase):
             self.assert_status(run, 0)
             self.assertEqual(run.stderr, "")
             for expected in ("a few disks", "30 grains, 3 boundaries", "subdomains 3", "2D: friction, rotation, gravity", "off         restitution",
-                             "contacts", "interface", "multiplicity", "bytes of each item", "MiB at most on a rank while it runs", " a contact, ",
+                             "contacts", "interface: 0 bodies, 1 interactions", "bytes of each item", "MiB at most on a rank while it runs", " a contact, ",
                              "nothing was run", "tolerance = 0.001"):
                 self.assertIn(expected, run.stdout)
             outputs.append([line for line in run.stdout.splitlines()
                             if not line.startswith("ranks") and "on the rank with most" not in line and "at most on a rank while" not in line])
         self.assertEqual(*outputs)
         self.assertEqual(os.listdir(directory), before)
+        # bodies of the interface by the number of subdomains that share them
+        run = run_case(merged(DISKS, {"decomposition": {"subdomains": 6}}), 1, self.here("shared"))
+        self.assertRegex(run.stdout, r"interface: \d+ bodies \(\d+ in 2 subdomains(, \d+ in \d subdomains)*\), \d+ interactions\n")
+        for total, parts in re.findall(r"interface: (\d+) bodies \((.*?)\)", run.stdout):
+            self.assertEqual(int(total), sum(int(part.split()[0]) for part in parts.split(", ")))
 
     def test_check_says_what_is_off(self):
         directory = self.here("off")

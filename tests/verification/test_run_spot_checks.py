@@ -50,7 +50,7 @@ class SpotChecks(RunTestCase):
         self.assertGreater(estimated, 0.5 * off)
         self.assertLess(estimated, 5.0 * off)
         self.assertRegex(found[2], r" +forces of a single step were off by \d+ % at contacts, \d+ % in the mean stress, \d+ % on 'wall \d+', "
-                                   r"\d+ % on 'wall \d+', on others between these")
+                                   r"\d+ % on 'wall \d+', on the others between the two")
 
     def assert_same(self, first, second):
         """The same history, but for clocks, and the same states."""

@@ -21,6 +21,8 @@ program test_run_summary
   call test_newton()
   call test_waiting()
   call test_plain()
+  call test_lists()
+  call test_ranks()
   call test_refuted()
   call test_misses()
   call finish_checks()
@@ -35,7 +37,8 @@ contains
     call make_scene(comm, column//"&time step = 0.01, steps = 100 / &output every = 10 /", simulation)
     call check(says(simulation, [phase_output], "a larger &output every, now 10"), "output that takes most of the time")
     call check(.not. says(simulation, [phase_neighbourhood], "&output"), "output that takes none of it")
-    call check(says(simulation, [phase_neighbourhood], "a larger &scene skin"), "neighbour lists that take most of the time")
+    call check(says(simulation, [phase_neighbourhood], "neighbour lists take most of it: a larger &scene skin, now "), &
+      & "neighbour lists that take most of the time")
     call simulation%free()
     call make_scene(comm, column//"&time step = 0.01, steps = 100 / &output every = 100 /", simulation)
     call check(.not. says(simulation, [phase_output], "&output every"), "no state is written but the first and the last")
@@ -103,6 +106,47 @@ contains
     call check(.not. says(simulation, [phase_sweep], words), "few iterations")
     call simulation%free()
   end subroutine test_plain
+
+  !> Lists that are made in most steps and take a part of the time are named before more ranks.
+  subroutine test_lists()
+    type(simulation_t) :: simulation
+    integer, parameter :: shared(4) = [phase_neighbourhood, phase_output, phase_sweep, phase_check]
+    character(len=*), parameter :: words = "no change of one key suffices; neighbour lists, built in 51 of 100 steps, take "// &
+      & "23 %: a larger &scene skin, now 7.00E-02 m, lets them last longer"
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 /", simulation)
+    simulation%decomposition%rule%skin = 0.07_dp
+    simulation%tally%steps = 100
+    simulation%halo%builds = 51
+    allocate (simulation%problem%sub(1))
+    call check(says(simulation, shared, words), "lists of most steps")
+    simulation%problem%sub(1)%n_contacts = 10000
+    call check(says(simulation, shared, words), "lists of most steps, where more ranks would pay")
+    call check(.not. says(simulation, [phase_neighbourhood, phase_output, phase_sweep, phase_check, phase_exchange], "skin"), &
+      & "they take less than a fifth")
+    simulation%halo%builds = 50
+    call check(.not. says(simulation, shared, "skin"), "lists of every other step")
+    call simulation%free()
+  end subroutine test_lists
+
+  !> More ranks are advised with subdomains, where the method has them, or with another method.
+  subroutine test_ranks()
+    type(simulation_t) :: simulation
+    character(len=*), parameter :: words = "twice the ranks, now 1, with as many &decomposition subdomains or more, now 1", &
+      & another = ", by a &solver method that has subdomains, such as 'nscdd'"
+
+    call make_scene(comm, column//"&time step = 0.01, steps = 100 /", simulation)
+    allocate (simulation%problem%sub(1))
+    simulation%problem%sub(1)%n_contacts = 10000
+    call check(says(simulation, [phase_sweep, phase_output], words//another), "a method of one domain")
+    simulation%config%solver%method = "schwarz"
+    simulation%config%solver%acceleration = "momentum"
+    call check(says(simulation, [phase_sweep, phase_output], words), "a method of subdomains")
+    call check(.not. says(simulation, [phase_sweep, phase_output], another), "it has them already")
+    simulation%problem%sub(1)%n_contacts = 1000
+    call check(.not. says(simulation, [phase_sweep, phase_output], words), "few contacts")
+    call simulation%free()
+  end subroutine test_ranks
 
   !> Solves that reached the accuracy by their estimates, of which spot checks have found too many wrong: the run has not converged.
   subroutine test_refuted()
