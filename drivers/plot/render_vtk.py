@@ -163,10 +163,10 @@ def axes_of(bounds, camera, flat):
         axes.SetXLabel("x")
         axes.SetYLabel("y")
         axes.SetZLabel("z")
-        axes.SetNumberOfLabels(4)
+        axes.SetNumberOfLabels(3)
         axes.SetLabelFormat("%.2g")
         axes.SetFontFactor(0.9)
-        axes.SetCornerOffset(0.02)
+        axes.SetCornerOffset(0.06)
         texts = [axes.GetAxisTitleTextProperty(), axes.GetAxisLabelTextProperty()]
         lines = [axes.GetProperty()]
     else:
