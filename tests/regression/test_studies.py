@@ -377,9 +377,14 @@ class ClosingTable(unittest.TestCase):
 
     def test_lmgc90(self):
         def judge(given):
-            return study_lmgc90.accepted([{"example": "RIGID_3D/Wall_PR", **given}])
+            return study_lmgc90.accepted([{"example": "RIGID_3D/Wall_PR", "lacks": "", **given}])
         self.breaks(judge, {"imports": "yes", "steps": 20, "status": "0"}, {"imports": "no", "steps": 0, "status": "4"})
         self.assertEqual(judged(study_lmgc90.accepted, [])[0], 1)
+        # one of the page that has a script in the place of a DATBOX counts only where there is a pre-processor
+        wall = {"example": "RIGID_3D/Wall_PR", "imports": "yes", "steps": 20, "status": "0", "lacks": ""}
+        for lacks, status in ((f"gen_sample.py {study_lmgc90.UNTRIED}", 0), ("gen_sample.py: more than 300 s", 1)):
+            ball = {"example": "RIGID_3D/1SP_PL", "imports": "no", "steps": "", "status": "", "lacks": lacks}
+            self.assertEqual(judged(study_lmgc90.accepted, [wall, ball])[0], status, lacks)
 
     def test_side_by_side(self):
         good = {"example": "wall", "mass_ratio": 1.0, "mean_force_on_ground_over_weight_gravier": 0.98,
