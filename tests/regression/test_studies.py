@@ -28,6 +28,7 @@ import study_error  # noqa: E402
 import study_hard  # noqa: E402
 import study_hopper  # noqa: E402
 import study_lmgc90  # noqa: E402
+import study_loop  # noqa: E402
 import study_side_by_side  # noqa: E402
 import study_silo  # noqa: E402
 import study_support  # noqa: E402
@@ -385,6 +386,20 @@ class ClosingTable(unittest.TestCase):
         for lacks, status in ((f"gen_sample.py {study_lmgc90.UNTRIED}", 0), ("gen_sample.py: more than 300 s", 1)):
             ball = {"example": "RIGID_3D/1SP_PL", "imports": "no", "steps": "", "status": "", "lacks": lacks}
             self.assertEqual(judged(study_lmgc90.accepted, [wall, ball])[0], status, lacks)
+
+    def test_loop(self):
+        good = {"ratio": 1.03, "error": 0.008, "differ": 0, "compared": 90}
+        for quick in (False, True):
+            self.breaks(lambda given, quick=quick: study_loop.accepted(given, quick), good, {"ratio": 1.05, "differ": 1, "error": 0.05})
+        self.assertEqual(judged(study_loop.accepted, {**good, "error": 0.02, "ratio": 1.0}, False)[0], 1)
+        # starts and other work of a pair cancel: steps of 2 and 3 s after starts of 10 and 20 s, on a machine that is slower by factors
+        slower = np.array([1.0, 1.5, 0.7, 2.0])[:, None]
+        seconds = [slower * (np.array([10.0, 20.0]) + number * np.array([2.0, 3.0])) for number in (10, 50)]
+        row = study_loop.measured(4, (10, seconds[0]), (50, seconds[1]))
+        self.assertAlmostEqual(row["ratio"], 1.5)
+        self.assertAlmostEqual(row["error"], 0.0)
+        self.assertAlmostEqual(row["start"], 12.5)
+        self.assertAlmostEqual(row["program"], 2.5)
 
     def test_side_by_side(self):
         good = {"example": "wall", "mass_ratio": 1.0, "mean_force_on_ground_over_weight_gravier": 0.98,
