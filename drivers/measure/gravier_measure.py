@@ -72,7 +72,7 @@ def parse(arguments):
     for kind in (forces, fields):
         kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):
-        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N rows of history.csv after each other, which are steps unless history_every is more than 1")
+        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other (rows of history.csv)")
     for kind in (mixing, heap, walls, outflow, forces, fields):
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
     for kind in (mixing, heap, walls, outflow, forces, fields, sieve):
@@ -190,8 +190,8 @@ def said(table, run, options, together=None):
         last = sine_of_means(run, (options.axial, options.lateral, options.mean), first, options.since)
         lines.append(f"sin phi: largest {sine[peak]:.3g} at an axial strain of {table.axial_strain[peak]:.4g}, of the means of the last {len(table) - first} rows "
                      f"{last:.3g}; stresses are {stresses_from(run)}")
-        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {time:.6g} leaves it out"
-                  for name, time, strain in ways_through_air(run, options.since)]
+        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {later:.6g} leaves it out"
+                  for name, time, strain, later in ways_through_air(run, options.since)]
     if together:
         lines.append(f"all states: {in_words({name: values[0] for name, values in together.items() if name != 'time'}, run)}")
     return lines

@@ -11,9 +11,9 @@ from one_line import plain
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
+from gravier.histories import History
 from gravier.measured import read_measured
 from gravier.outflows import FORMER, former_name
-from gravier.tables import Table
 
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
@@ -233,16 +233,16 @@ def rows_between(run_and_table, history, since, until):
     if since is None and until is None:
         return history
     low, high = -numpy.inf if since is None else since, numpy.inf if until is None else until
-    inside = (history["time"] > low) & (history["time"] <= high)
-    if not inside.any():
+    inside = history.between(low, high) if isinstance(history, History) else history.rows((history["time"] > low) & (history["time"] <= high))
+    if len(inside) == 0:
         window = f"after {since:g} s" if until is None else f"up to {until:g} s" if since is None else f"after {since:g} s and up to {until:g} s"
         raise PictureError(f"{run_and_table[0].directory / run_and_table[1]}: no row {window}; expected some of its times, {history['time'][0]:.6g} to {history['time'][-1]:.6g} s")
-    return Table({name: values[inside] for name, values in history.items()})
+    return inside
 
 
-def draw_history(runs, columns, against="time", rows=1, table="history.csv", window=(None, None)):
-    """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
-    many rows. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told. `window` is that of `rows_between`."""
+def draw_history(runs, columns, against="time", mean=1, table="history.csv", window=(None, None)):
+    """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `mean` of means of so
+    many steps of history.csv, of rows of other tables. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told. `window` is that of `rows_between`."""
     histories = [run.history() if table == "history.csv" else read_measured(run, table) for run in runs]
     columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
@@ -254,8 +254,8 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv", win
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     histories = [rows_between((run, table), history, *window) for run, history in zip(runs, histories)]
-    if rows > 1:
-        histories = [history.means(rows) for history in histories]
+    if mean > 1:
+        histories = [history.means(mean) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
     curves = [Curve(column, histories[0]) for column in columns]

@@ -88,7 +88,7 @@ class Axes(unittest.TestCase):
         times = np.arange(1, 11) / 10.0
         run = SimpleNamespace(directory=pathlib.Path("run"), dimension=2, history=lambda: gravier.Table({"time": times, "contacts": 10.0 * times}))
         for window, rows, drawn in (((None, None), 1, times), ((0.3, None), 1, times[3:]), ((None, 0.3), 1, times[:3]), ((0.2, 0.6), 1, times[2:6]), ((0.2, 0.6), 2, [0.35, 0.55])):
-            x, y = curve_pictures.draw_history([run], ["contacts"], rows=rows, window=window).axes[0].lines[0].get_data()
+            x, y = curve_pictures.draw_history([run], ["contacts"], mean=rows, window=window).axes[0].lines[0].get_data()
             np.testing.assert_allclose(x, drawn, rtol=1e-14)
             np.testing.assert_allclose(y, 10.0 * np.asarray(drawn), rtol=1e-14)
         plt.close("all")

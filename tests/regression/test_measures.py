@@ -10,6 +10,7 @@ import numpy as np
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
+from gravier.histories import History
 from gravier.linked_grains import components, near_pairs
 from gravier.mixing import lacey, split_radius
 from gravier.wall_tests import sine_of_means
@@ -81,8 +82,12 @@ class Mixing(unittest.TestCase):
         self.assertEqual(len(gravier.mixing(States(bed, mirrored, mixed), by="y", since=0.15)), 1)
         fed = States(bed, mirrored)
         fed.case = {**fed.case, "insertion": [{}]}
-        with self.assertRaisesRegex(gravier.ResultsError, "mixing by y of grains that enter while it goes on, .* expected a run without &insertion, or mixing by size or material"):
+        np.testing.assert_allclose(gravier.mixing(fed, by="y").segregation, [1.0, -1.0], rtol=1e-12, err_msg="a case in which grains could enter, but did not")
+        fed.states.insert(0, gravier.Table({name: values[:-2] for name, values in fed.states[0].items()}))
+        fed.steps, fed.times = np.arange(3), 0.1 * np.arange(3)
+        with self.assertRaisesRegex(gravier.ResultsError, "grain 399 has entered after the first state, of step 0, and has no place y in it; expected mixing by size or material, or a time"):
             gravier.mixing(fed, by="y")
+        self.assertEqual(len(gravier.mixing(fed, by="y", since=0.05)), 2)
 
     def test_sizes_and_materials(self):
         """Large grains under small ones have -1, by volume; the same kinds by material."""
@@ -307,7 +312,7 @@ class Sheared(States):
         self.columns = columns
 
     def history(self):
-        return gravier.Table(self.columns)
+        return History(self.columns)
 
 
 class WallTests(RunTestCase):
@@ -394,8 +399,8 @@ class WallTests(RunTestCase):
             np.testing.assert_allclose(found.lateral_strain_x, 1.0 - wide / wide[0], atol=1e-12)
             np.testing.assert_allclose(found.volumetric_strain, 1.0 - wide * high / (wide * high)[0], atol=1e-12)
             np.testing.assert_allclose(found.void_ratio, wide * high / (np.pi * R**2) - 1.0, rtol=1e-12)
-        for words, options in (("20 rows after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
-                               ("0 rows after 9 s", {"since": 9.0})):
+        for words, options in (("20 steps after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
+                               ("0 steps after 9 s", {"since": 9.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.wall_test(run, **options)
         thin = self.squeezed("thin", boundaries=sides, more={"history_every": 7})
@@ -404,7 +409,8 @@ class WallTests(RunTestCase):
         for name in ("axial_strain", "lateral_strain_x", "volumetric_strain"):
             np.testing.assert_array_equal(found[name], whole[name][found.step.astype(int) - 1])
         np.testing.assert_array_equal(gravier.wall_test(thin, since=0.0065).step, [7, 14, 20])
-        with self.assertRaisesRegex(gravier.ResultsError, r"thin/history.csv: no row of step 10, the first one after 0.0095 s, to which strains refer; expected one, as"):
+        with self.assertRaisesRegex(gravier.ResultsError, r"thin/history.csv: no row and no written state of step 10, the first one after 0.0095 s, to "
+                                    r"which strains refer; expected a time before a step that has one, such as 0.0065 s, before step 7$"):
             gravier.wall_test(thin, since=0.0095)
         with self.assertRaisesRegex(gravier.ResultsError, r"no column position_x:low x; &output boundary_forces"):
             gravier.wall_test(self.squeezed("no forces", more={"boundary_forces": False}))
@@ -508,8 +514,8 @@ class Command(RunTestCase):
                 getattr(gravier.outflow(run, 400), name)
             with self.assertRaisesRegex(KeyError, words):
                 gravier.outflow(run, 400)[name]
-        for options, words in (({"mean": 0}, "mean 0: expected a whole number of rows above 0"), ({"mean": 401}, "400 rows after 0 s; expected 401 at least"),
-                               ({"since": 0.4}, "0 rows after 0.4 s; expected 1 at least")):
+        for options, words in (({"mean": 0}, "mean 0: expected a whole number of steps above 0"), ({"mean": 401}, "400 steps after 0 s; expected 401 at least"),
+                               ({"since": 0.4}, "0 steps after 0.4 s; expected 1 at least")):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.outflow(run, **options)
         done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)

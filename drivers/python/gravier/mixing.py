@@ -25,7 +25,7 @@ def mixing(run, by="size", value=None, cell=None, since=0.0):
         bodies = free_grains(run, step)
         volume = run.volumes(bodies)
         if is_first is None and len(bodies):
-            is_first = _kind(run, bodies, by, value)
+            is_first = _kind(run, step, bodies, by, value)
             cell = _cell(run, bodies, cell)
         chosen = is_first(bodies) if is_first else np.zeros(0, dtype=bool)
         if chosen.all() or not chosen.any():
@@ -97,8 +97,8 @@ def heights(height, volume, chosen, radius):
     return difference, difference / abs(largest) if largest != 0.0 else np.nan
 
 
-def _kind(run, bodies, by, value):
-    """The function that finds the grains of the first kind among bodies."""
+def _kind(run, step, bodies, by, value):
+    """The function that finds the grains of the first kind among bodies; `bodies` are the free ones of the first state, which is that of `step`."""
     if by == "material":
         number = _material(run, value)
         return lambda held: held.material == number
@@ -108,12 +108,17 @@ def _kind(run, bodies, by, value):
     axes = "xyz"[:run.dimension]
     if by not in tuple(axes):
         raise ResultsError(f"by {by!r}: expected one of size, material, {', '.join(axes)}")
-    if "insertion" in run.case:
-        raise ResultsError(f"{run.path}: mixing by {by} of grains that enter while it goes on, which have no place in its first state; expected a run without &insertion, or "
-                           "mixing by size or material")
-    place = bodies.position[:, axes.index(by)]
-    above = bodies.id[place > (np.median(place) if value is None else _number(value, by))]
-    return lambda held: np.isin(held.id, above)
+    limit, known = np.median(bodies.position[:, axes.index(by)]) if value is None else _number(value, by), run.bodies(step)
+    above = known.id[known.position[:, axes.index(by)] > limit]
+
+    def is_above(held):
+        late = held.id[~np.isin(held.id, known.id)]
+        if len(late):
+            raise ResultsError(f"{run.path}: grain {late[0]} has entered after the first state, of step {step}, and has no place {by} in it; expected mixing by size or material, or "
+                               "a time since at which all grains are there")
+        return np.isin(held.id, above)
+
+    return is_above
 
 
 def _size_limit(bodies, value):
