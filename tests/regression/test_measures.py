@@ -543,8 +543,8 @@ class Command(RunTestCase):
         runs = [gravier.Run(os.path.join(self.directory, "results"))]
         figure = draw_history(runs, None, table="heap.csv")
         self.assertEqual([axes.get_ylabel() for axes in figure.axes if "low" not in axes.get_ylabel()],
-                         ["height [m]", "front high [m]", "length [m]", "run out", "angle high [degrees]"])
-        self.assertEqual([axes.get_ylabel() for axes in draw_history(runs, ["run_out"], table="heap.csv").axes], ["run out"])
+                         ["height [m]", "front high [m]", "length [m]", "run-out", "angle high [degrees]"])
+        self.assertEqual([axes.get_ylabel() for axes in draw_history(runs, ["run_out"], table="heap.csv").axes], ["run-out"])
         done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "heap.csv", directory=self.directory, environment=ENVIRONMENT)
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "results/heap.png\n", ""))
         done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "walls.csv", directory=self.directory, environment=ENVIRONMENT)
