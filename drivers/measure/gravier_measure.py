@@ -19,7 +19,7 @@ from gravier.joined_bodies import opened_file  # noqa: E402
 from gravier.measured import write_measured  # noqa: E402
 from gravier.mixing import split_radius  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
-from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, steps_of, whole  # noqa: E402
+from one_line import NEGATIVE, OneLineParser, finite, length, plain, positive, run_tool, steps_of, whole  # noqa: E402
 from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
@@ -68,7 +68,7 @@ def parse(arguments):
     fields.add_argument("--columns", metavar="A,B", help="of the picture (solid_fraction,velocity,granular_temperature,pressure,shear_ratio,inertial_number)")
     sieve = kinds.add_parser("sieve", help="the part of the mass that passes a sieve against its size, D10, D50, D60 and C_u, of a state or of a bodies file")
     sieve.add_argument("--step", type=whole(0), metavar="N", help="a written step (the last one)")
-    sieve.add_argument("--sieves", type=positive, nargs="+", metavar="SIZE", help="sizes of holes [m] (40 from the smallest body to the largest one)")
+    sieve.add_argument("--sieves", type=length, nargs="+", metavar="SIZE", help="sizes of holes [m], or with their unit such as 0.063mm (40 from the smallest body to the largest one)")
     for kind in (forces, fields):
         kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):

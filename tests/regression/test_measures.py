@@ -122,12 +122,19 @@ class Mixing(unittest.TestCase):
 
     def test_refusals(self):
         run = States(grid(4, 4))
-        for words, options in (("no written state has grains of both kinds by size", {}), ("by 'q': expected one of size, material, x, y", {"by": "q"}),
+        run.states[0]["material"] = np.ones(16, dtype=int)
+        for words, options in (("states: all grains have radii of 0.01 m; expected two sizes or places, or another of --by size, material, x, y$", {}), ("by 'q': expected one of size, material, x, y", {"by": "q"}),
+                               ("each written state are of one kind, and have radii of 0.01 to 0.01 m; expected a value that divides them, and not 0.5$", {"value": 0.5}),
+                               ("each written state are of one kind, and began at y = 0.01 to 0.07 m; expected a value that divides them, and not 3$", {"by": "y", "value": 3}),
+                               ("each written state are of one kind, of the materials sand; expected grains of material steel and others together$", {"by": "material"}),
                                ("material 'gold'; expected one of sand, steel", {"by": "material", "value": "gold"}),
                                ("cell -1: expected a length above 0", {"by": "x", "cell": -1}), ("x 'a': expected a number", {"by": "x", "value": "a"}),
                                ("no written state from 3 s on; expected a time of at most 0 s", {"by": "x", "since": 3.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.mixing(run, **options)
+        run.case = {"material": [{"name": "sand"}]}
+        with self.assertRaisesRegex(gravier.ResultsError, "mixing by material of a case whose only material is sand; expected a second &material, or mixing by size or by x, y, where"):
+            gravier.mixing(run, by="material")
 
 
 def wedge(degrees, half, dimension=2):
@@ -580,7 +587,7 @@ class Command(RunTestCase):
                                  (["heap", "results", "--out", "results/history.csv"], "history.csv: there is a file of another kind or origin"),
                                  (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
                                  (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
-                                 (["mixing", "results", "--by", "material"], "results.h5: no second material; expected one of none, the case has no &material"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
+                                 (["mixing", "results", "--by", "material"], "results.h5: mixing by material of a case without &material, whose grains are of one material; expected a second &material, or mixing by size"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
                                  (["walls", "results", "--mean", "0"], "expected an integer >= 1"),
                                  (["outflow", "results"], "no column left_mass; expected a run with a boundary of shape outlet"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
             with self.subTest(arguments=arguments):

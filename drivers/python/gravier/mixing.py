@@ -35,7 +35,7 @@ def mixing(run, by="size", value=None, cell=None, since=0.0):
         rows.append((step, time, lacey(number.ravel(), chosen), *heights(bodies.position[:, -1], volume, chosen, bodies.radius.mean()),
                      chosen.mean(), len(bodies), number.max() + 1))
     if not any(np.isfinite(row[5]) for row in rows):
-        raise ResultsError(f"{run.path}: no written state has grains of both kinds by {by}; expected two sizes, materials or sides, or another value")
+        raise ResultsError(f"{run.path}: {_only_kind(run, by, value, since)}")
     names = ("step", "time", "mixing", "height_difference", "segregation", "share", "grains", "cells")
     return Table({name: np.array(values) for name, values in zip(names, zip(*rows))})
 
@@ -121,6 +121,22 @@ def _kind(run, step, bodies, by, value):
     return is_above
 
 
+def _only_kind(run, by, value, since):
+    """What all grains of the written states share, so that they are of one kind, and what was expected."""
+    states = [bodies for bodies in (free_grains(run, step) for step, _ in states_since(run, since)) if len(bodies)]
+    if not states:
+        return "no written state has grains; expected grains of two kinds"
+    if by == "material":
+        names = [group.get("name") for group in run.case.get("material", [])]
+        found = [names[number - 1] for number in np.unique(np.concatenate([bodies.material for bodies in states]))]
+        return f"the grains of each written state are of one kind, of the materials {', '.join(found)}; expected grains of material {names[_material(run, value) - 1]} and others together"
+    values, what = (states[0].position[:, "xyz".index(by)], f"began at {by} =") if by in tuple("xyz") else (np.concatenate([bodies.radius for bodies in states]), "have radii of")
+    low, high = values.min(), values.max()
+    if value is None and low == high:
+        return f"all grains {what} {low:.6g} m; expected two sizes or places, or another of --by size, material, {', '.join('xyz'[:run.dimension])}"
+    return f"the grains of each written state are of one kind, and {what} {low:.6g} to {high:.6g} m; expected a value that divides them" + ("" if value is None else f", and not {value}")
+
+
 def _size_limit(bodies, value):
     return 0.5 * (bodies.radius.min() + bodies.radius.max()) if value is None else _number(value, "radius")
 
@@ -137,8 +153,10 @@ def _material(run, value):
     except (TypeError, ValueError):
         number = 0
     if not 1 <= number <= len(names):
-        known = ", ".join(map(str, names)) or "none, the case has no &material"
-        raise ResultsError(f"{run.path}: {'no second material' if value is None else f'material {value!r}'}; expected one of {known}")
+        case = f"a case whose only material is {names[0]}" if len(names) == 1 else "a case without &material, whose grains are of one material"
+        if len(names) < 2:
+            raise ResultsError(f"{run.path}: mixing by material of {case}; expected a second &material, or mixing by size or by {', '.join('xyz'[:run.dimension])}, where grains were at the start")
+        raise ResultsError(f"{run.path}: material {value!r}; expected one of {', '.join(map(str, names))}")
     return number
 
 
