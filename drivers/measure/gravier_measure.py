@@ -19,7 +19,7 @@ from gravier.joined_bodies import opened_file  # noqa: E402
 from gravier.measured import write_measured  # noqa: E402
 from gravier.mixing import split_radius  # noqa: E402
 from gravier.wall_tests import sine_of_means, stresses_from, ways_through_air  # noqa: E402
-from one_line import NEGATIVE, OneLineParser, finite, plain, positive, run_tool, steps_of, whole  # noqa: E402
+from one_line import NEGATIVE, OneLineParser, finite, length, plain, positive, run_tool, steps_of, whole  # noqa: E402
 from whole_file import PICTURES, claim, written  # noqa: E402
 
 #: what its tables begin with, by the kind of measure
@@ -68,11 +68,11 @@ def parse(arguments):
     fields.add_argument("--columns", metavar="A,B", help="of the picture (solid_fraction,velocity,granular_temperature,pressure,shear_ratio,inertial_number)")
     sieve = kinds.add_parser("sieve", help="the part of the mass that passes a sieve against its size, D10, D50, D60 and C_u, of a state or of a bodies file")
     sieve.add_argument("--step", type=whole(0), metavar="N", help="a written step (the last one)")
-    sieve.add_argument("--sieves", type=positive, nargs="+", metavar="SIZE", help="sizes of holes [m] (40 from the smallest body to the largest one)")
+    sieve.add_argument("--sieves", type=length, nargs="+", metavar="SIZE", help="sizes of holes [m], or with their unit such as 0.063mm (40 from the smallest body to the largest one)")
     for kind in (forces, fields):
         kind.add_argument("--box", type=finite, nargs="+", metavar="X0", help="in the box X0 X1 Y0 Y1 [Z0 Z1] [m] (all)")
     for kind in (walls, outflow):
-        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N rows of history.csv after each other, which are steps unless history_every is more than 1")
+        kind.add_argument("--mean", type=whole(1), default=1, metavar="N", help="means of N steps after each other (rows of history.csv)")
     for kind in (mixing, heap, walls, outflow, forces, fields):
         kind.add_argument("--since", type=finite, default=0.0, metavar="T", help="time at which the process begins; what was before is left out [s] (0)")
     for kind in (mixing, heap, walls, outflow, forces, fields, sieve):
@@ -190,8 +190,8 @@ def said(table, run, options, together=None):
         last = sine_of_means(run, (options.axial, options.lateral, options.mean), first, options.since)
         lines.append(f"sin phi: largest {sine[peak]:.3g} at an axial strain of {table.axial_strain[peak]:.4g}, of the means of the last {len(table) - first} rows "
                      f"{last:.3g}; stresses are {stresses_from(run)}")
-        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {time:.6g} leaves it out"
-                  for name, time, strain in ways_through_air(run, options.since)]
+        lines += [f"{plain(name)} bears nothing before {time:.6g} s, and strains count {strain:.3g} for its way until then; --since {later:.6g} leaves it out"
+                  for name, time, strain, later in ways_through_air(run, options.since)]
     if together:
         lines.append(f"all states: {in_words({name: values[0] for name, values in together.items() if name != 'time'}, run)}")
     return lines

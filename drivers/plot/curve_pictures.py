@@ -11,9 +11,9 @@ from one_line import plain
 from palette import LINES, SHADES
 from picture_style import PictureError, scaled
 
+from gravier.histories import History
 from gravier.measured import read_measured
 from gravier.outflows import FORMER, former_name
-from gravier.tables import Table
 
 #: early steps are light, late ones dark
 TIMES = LinearSegmentedColormap.from_list("times", SHADES[1:])
@@ -32,7 +32,17 @@ PLACES = re.compile(r"(position|body)_[xyz]:|front_")
 NEAR, NARROW = 0.2, 1e-3
 #: of the label of a panel at most
 MOST_LINES = 4
-NAMES = {"shear_ratio": "shear stress ratio |τ|/p", "max_overlap": "largest overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve"}
+NAMES = {"shear_ratio": "shear stress ratio |τ|/p", "max_overlap": "largest overlap", "overlap_mean": "mean overlap", "wall_seconds": "wall time of a step", "solve_seconds": "wall time of a solve",
+         "velocity_scale": "velocity scale U", "left": "grains that leave in a step", "left_mass": "mass that leaves in a step", "entered": "grains that enter in a step", "entered_mass": "mass that enters in a step",
+         "total_left": "grains that have left", "total_left_mass": "mass that has left", "number_rate": "grains that leave", "mass_rate": "mass that leaves", "fast": "grains that are too fast",
+         "converged": "converged (1) or not (0)", "force_mean": "mean normal force", "force_max": "largest normal force", "dissipated_normal": "dissipated by impacts", "dissipated_friction": "dissipated by friction",
+         "mixing": "Lacey's index M", "sin_phi": "sin φ", "run_out": "run-out"}
+#: columns of boundaries and bodies: what stands for the text before the sign
+OF_BOUNDARY = re.compile(r"(force|moment|position|velocity|spin|power)(?:_([xyz]))?:(.*)", re.S)
+OF_BODY = re.compile(r"body_(v|omega|w|f|m)?([xyz])?:(.*)", re.S)
+BODY_WORDS = {None: "place", "v": "velocity", "omega": "spin", "w": "spin", "f": "force", "m": "moment"}
+#: columns that decay over decades, or begin at 0: on an axis of logarithms their zeros may be missing
+DECAYS = re.compile(r"residual|jump|velocity_error|energy_error|.*kinetic|.*granular_temperature|max_overlap|overlap_mean|dissipated_")
 
 
 def times_of(component):
@@ -52,7 +62,7 @@ def label_of_all(name, dimensions):
 
 def label_of(name, dimension):
     """Name of a column of history.csv with its unit."""
-    text = NAMES.get(name, name.replace("_", " "))
+    text = NAMES.get(name, words_of_place(name) or name.replace("_", " "))
     if re.search(r"(^|_)(stress(_[xyz]{2})?|pressure|axial_stress|lateral_stress)$", name):
         return f"{text} [{'N/m' if dimension == 2 else 'Pa'}]"
     if re.search(r"(^|_)volume$", name):
@@ -61,6 +71,19 @@ def label_of(name, dimension):
         return f"{text} [{'kg/m²' if dimension == 2 else 'kg/m³'}]"
     unit = next((unit for pattern, unit in UNITS if re.match(pattern, name)), None)
     return f"{text} [{unit}]" if unit else text
+
+
+def words_of_place(name):
+    """Words for a column of a boundary or of a tracked body; None for others."""
+    found = OF_BOUNDARY.fullmatch(name)
+    if found:
+        kind, axis, place = found.groups()
+        return f"{kind}{f' {axis}' if axis else ''} {'on' if kind in ('force', 'moment') else 'of'} {place.replace('_', ' ')}"
+    found = OF_BODY.fullmatch(name)
+    if found:
+        kind, axis, number = found.groups()
+        return f"{BODY_WORDS[kind]}{f' {axis}' if axis else ''} {'on' if kind in ('f', 'm') else 'of'} body {number}"
+    return None
 
 
 def names_of(runs):
@@ -74,15 +97,16 @@ def names_of(runs):
     return ["/".join(path[first:len(path) - last + 1]) for path in parts]
 
 
-def limits_of(values, logarithms=True, places=False):
+def limits_of(values, logarithms=True, places=False, zeros=False):
     """Scale and limits of an axis on which the values are seen: logarithms where the largest is far above a quarter of them, but no more
-    than three decades for the least twentieth; from 0 where that is near. The axis of places fits them, wherever 0 is."""
+    than three decades for the least twentieth; from 0 where that is near. Values of 0 have no place on logarithms: there are none with them unless `zeros`
+    may be missing. The axis of places fits them, wherever 0 is."""
     values = values[numpy.isfinite(values)]
     positive = values[values > 0.0]
     if len(values) == 0:
         return "linear", 0.0, 1.0
     low, high = values.min(), values.max()
-    if logarithms and not places and low >= 0.0 and 2 * len(positive) > len(values):
+    if logarithms and not places and (low > 0.0 or zeros and low == 0.0) and 2 * len(positive) > len(values):
         if high > 30.0 * numpy.quantile(positive, 0.25):
             return "log", max(positive.min(), 1e-3 * numpy.quantile(positive, 0.05)) / 1.5, 1.5 * high
     if not places and 0.0 <= low < NEAR * high:
@@ -104,12 +128,18 @@ def base_of(low, high):
     return base, f"{'−' if base > 0.0 else '+'} {abs(base):.{max(0, digits)}f}"
 
 
-def fit_axis(axis, values, label, logarithms=True, places=False):
-    """Scale, limits and label of an axis for these values. A power of ten stands in the label, beside the unit, not over the panel; what all
-    numbers begin with stands in a second line of the label."""
+def fit_axis(axis, values, label, logarithms=True, places=False, zeros=False):
+    """Scale, limits and label of an axis for these values."""
     name = axis.axis_name
-    scale, low, high = limits_of(values, logarithms, places)
+    scale, low, high = limits_of(values, logarithms, places, zeros)
     axis.axes.set(**{f"{name}scale": scale, f"{name}lim": (low, high)})
+    name_axis(axis, (low, high), label, scale)
+
+
+def name_axis(axis, limits, label, scale="linear"):
+    """The label and the numbers of an axis with these limits. A power of ten stands in the label, beside the unit, not over the panel; what all
+    numbers begin with stands in a second line of the label."""
+    low, high = limits
     base, text = base_of(low, high) if scale == "linear" else (0.0, "")
     top = max(abs(low - base), abs(high - base))
     if scale == "linear" and (text or not 1e-2 <= top < 1e4):
@@ -137,26 +167,29 @@ def grid(axes):
 
 class Panel:
     """Curves over one axis: `label` of the vertical axis, `curves` (x, y, name or None), `goals` (value, name); never with logarithms
-    where `counts`; `places` fit the panel, wherever 0 is."""
+    where `counts`; `places` fit the panel, wherever 0 is; `zeros` may be missing on logarithms."""
 
-    def __init__(self, label, curves, goals=(), counts=False, places=False):
-        self.label, self.curves, self.goals, self.counts, self.places = label, curves, list(goals), counts, places
+    def __init__(self, label, curves, goals=(), counts=False, places=False, zeros=False):
+        self.label, self.curves, self.goals, self.counts, self.places, self.zeros = label, curves, list(goals), counts, places, zeros
 
     def draw(self, axes, colours=LINES):
         values = numpy.concatenate([numpy.asarray(y, float) for _, y, _ in self.curves] + [[value] for value, _ in self.goals])
-        scale, low, _ = limits_of(values, not self.counts, self.places)
+        scale, low, _ = limits_of(values, not self.counts, self.places, self.zeros)
+        missing = False
         for k, (x, y, name) in enumerate(self.curves):
             if scale == "log" and name and not (numpy.asarray(y) > 0.0).any():
                 name += ": 0"
+            else:
+                missing = missing or scale == "log" and (numpy.asarray(y) == 0.0).any()
             axes.plot(x, y, color=colours[k % len(colours)], linestyle=STYLES[k // len(colours) % len(STYLES)], linewidth=1.2, label=name,
                       marker="o" if len(x) <= 50 else None, markersize=3)
         for value, name in self.goals:
             axes.axhline(value, color="0.35", linewidth=0.9, linestyle=(0, (5, 2)), label=name)
         grid(axes)
-        fit_axis(axes.yaxis, values, self.label, not self.counts, self.places)
+        fit_axis(axes.yaxis, values, self.label, not self.counts, self.places, self.zeros)
         positive = values[numpy.isfinite(values) & (values > 0.0)]
-        if scale == "log" and positive.min() < low:
-            axes.text(0.995, 0.03, f"values go down to {positive.min():.1g}", transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="0.35")
+        if scale == "log" and (missing or positive.min() < low):
+            axes.text(0.995, 0.03, f"values go down to {0.0 if missing else positive.min():.1g}", transform=axes.transAxes, ha="right", va="bottom", fontsize=7, color="0.35")
         legend_above(axes)
 
 
@@ -166,9 +199,9 @@ def draw_panels(panels, width=6.2, height=1.75, along="time [s]"):
     figure, places = plt.subplots(len(panels), 1, figsize=(width, 0.4 + sum(high)), sharex=True, squeeze=False, constrained_layout=True)
     for axes, panel in zip(places[:, 0], panels):
         panel.draw(axes)
-    places[-1, 0].set_xlabel(along)
+    name_axis(places[-1, 0].xaxis, places[-1, 0].get_xlim(), along)
     figure.align_ylabels(places[:, 0])
-    fit_labels(figure, [(axes.yaxis, axes) for axes in places[:, 0]])
+    fit_labels(figure, [(axes.yaxis, axes) for axes in places[:, 0]] + [(places[-1, 0].xaxis, places[-1, 0])])
     return figure
 
 
@@ -233,16 +266,16 @@ def rows_between(run_and_table, history, since, until):
     if since is None and until is None:
         return history
     low, high = -numpy.inf if since is None else since, numpy.inf if until is None else until
-    inside = (history["time"] > low) & (history["time"] <= high)
-    if not inside.any():
+    inside = history.between(low, high) if isinstance(history, History) else history.rows((history["time"] > low) & (history["time"] <= high))
+    if len(inside) == 0:
         window = f"after {since:g} s" if until is None else f"up to {until:g} s" if since is None else f"after {since:g} s and up to {until:g} s"
         raise PictureError(f"{run_and_table[0].directory / run_and_table[1]}: no row {window}; expected some of its times, {history['time'][0]:.6g} to {history['time'][-1]:.6g} s")
-    return Table({name: values[inside] for name, values in history.items()})
+    return inside
 
 
-def draw_history(runs, columns, against="time", rows=1, table="history.csv", window=(None, None)):
-    """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `rows` of means of so
-    many rows. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told. `window` is that of `rows_between`."""
+def draw_history(runs, columns, against="time", mean=1, table="history.csv", window=(None, None)):
+    """A figure with a panel for each column of a table of a run, history.csv unless told, against time or another column, a line a run; with `mean` of means of so
+    many steps of history.csv, of rows of other tables. Columns, which may be the expressions of Curve, are all that the first run has numbers in unless told. `window` is that of `rows_between`."""
     histories = [run.history() if table == "history.csv" else read_measured(run, table) for run in runs]
     columns = columns or [name for name, values in histories[0].items() if name not in ("step", against) and numpy.isfinite(values).any()]
     for run, history in zip(runs, histories):
@@ -254,14 +287,14 @@ def draw_history(runs, columns, against="time", rows=1, table="history.csv", win
             if name not in history:
                 raise PictureError(f"{run.directory / table}: no column {name}; expected one of {', '.join(history)}")
     histories = [rows_between((run, table), history, *window) for run, history in zip(runs, histories)]
-    if rows > 1:
-        histories = [history.means(rows) for history in histories]
+    if mean > 1:
+        histories = [history.means(mean) for history in histories]
     names = names_of(runs) if len(runs) > 1 else [None]
     dimensions = [run.dimension for run in runs]
     curves = [Curve(column, histories[0]) for column in columns]
     along = Curve(against, histories[0])
     panels = [Panel(curve.label(dimensions), [(along.values(history), curve.values(history), name if k == 0 else None) for name, history in zip(names, histories)],
-                    counts=curve.text == "iterations", places=curve.other is None and bool(PLACES.match(curve.first)))
+                    counts=curve.text == "iterations", places=curve.other is None and bool(PLACES.match(curve.first)), zeros=curve.other is None and bool(DECAYS.match(curve.first)))
               for k, curve in enumerate(curves)]
     return draw_panels(panels, along=along.label(dimensions))
 

@@ -137,7 +137,7 @@ def colours_of(values):
         return {"cmap": TIMES, "norm": plt.Normalize(0.0, 1.0)}, "neither"
     low, high = numpy.quantile(known, (BEYOND, 1.0 - BEYOND))
     least, most, cmap = known.min(), known.max(), TIMES
-    if limits_of(known)[0] == "log":
+    if limits_of(known, zeros=True)[0] == "log":
         # what is 0 has no logarithm, and the colour of the least
         low = max(low, 1e-4 * high)
         norm = LogNorm(low, high)

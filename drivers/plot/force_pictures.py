@@ -10,15 +10,18 @@ from gravier.force_networks import STRONG
 
 def draw_forces(distribution, directions, beta, dimension):
     """A figure of the tables of `force_distribution` and `force_directions`: the probability density of forces over their mean with the exponential of strong
-    normal forces, `beta`, and a rose each of contacts, normal and tangential forces with their fits."""
+    normal forces, `beta`, and a rose each of contacts, normal and, where there are any, tangential forces with their fits."""
     if not numpy.isfinite(directions.contacts_fitted).all():
         raise PictureError(f"{int(directions['count'].sum())} contacts; expected more for a picture of their directions")
     figure = plt.figure(figsize=(6.6, 5.6), layout="constrained")
-    rows = figure.add_gridspec(2, 3, height_ratios=(1.15, 1.0))
-    draw_distribution(figure.add_subplot(rows[0, :]), distribution, beta)
     roses = [("contacts", "contacts", directions.contacts, directions.contacts_fitted),
              ("normal forces", "over their mean", directions.normal, directions.normal_fitted),
              ("tangential forces", "over the normal mean, light below 0", directions.tangential, directions.tangential_fitted)]
+    if not numpy.nan_to_num(directions.tangential).any():
+        # without friction there is none
+        del roses[2]
+    rows = figure.add_gridspec(2, len(roses), height_ratios=(1.15, 1.0))
+    draw_distribution(figure.add_subplot(rows[0, :]), distribution, beta)
     for k, (name, unit, values, fitted) in enumerate(roses):
         axes = figure.add_subplot(rows[1, k], projection="polar")
         draw_rose(axes, numpy.radians(directions.angle), values, fitted, LINES[(2, 0, 1)[k]], dimension)
@@ -29,6 +32,8 @@ def draw_forces(distribution, directions, beta, dimension):
 def draw_distribution(axes, rows, beta):
     for name, label, colour, mark in (("normal", "normal forces", LINES[0], "o"), ("tangential", "sizes of tangential forces", LINES[1], "s")):
         there = rows[name] > 0.0
+        if not there.any():
+            continue
         axes.semilogy(rows.force[there], rows[name][there], mark, color=colour, markersize=4, label=label)
     strong = (rows.force > STRONG[0]) & (rows.force < STRONG[1]) & (rows.normal > 0.0)
     if numpy.isfinite(beta) and strong.any():

@@ -64,7 +64,7 @@ def parse(arguments):
     history.add_argument("--since", type=finite, metavar="T", help="draw the rows after this time alone [s]")
     history.add_argument("--until", type=finite, metavar="T", help="draw the rows up to this time alone [s]")
     history.add_argument("--table", default="history.csv", metavar="FILE", help="another table in each DIR, such as mixing.csv of gravier_measure")
-    history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N rows of history.csv after each other, which are steps unless history_every is more than 1")
+    history.add_argument("--mean", type=int, default=1, metavar="N", help="means of N steps of history.csv after each other, of another table of N rows")
     history.add_argument("--against", default="time", metavar="COLUMN", help="another column than the time, such as a strain, or its opposite -COLUMN")
     convergence = kinds.add_parser("convergence", parents=[several], help="residual and jump of a solve (&output trace = .true.)")
     convergence.add_argument("--step", type=int, metavar="N", help="a step of trace.csv; that of most iterations unless told")

@@ -242,11 +242,11 @@ class Frame:
 
 
 def title_of(run, step, bodies, contacts, seen):
-    """What is drawn: where and when, and how many bodies; `seen` (n) tells which of them, None for all."""
+    """What is drawn: where and when, how many bodies, and how many contacts bear forces; `seen` (n) tells which of the bodies, None for all."""
     title = run.path.name if isinstance(run, gravier.BodiesFile) else f"step {step}, t = {run.time(step):.4g} s"
     part = "" if seen is None else f"{numpy.count_nonzero(seen)} of "
     title += f": {part}{len(bodies)} {'bodies' if shaped(bodies) else 'disks' if run.dimension == 2 else 'spheres'}"
-    return title if contacts is None or part else f"{title}, {len(contacts)} contacts"
+    return title if contacts is None or part else f"{title}, {numpy.count_nonzero(contacts.impulse.any(axis=1))} carrying contacts"
 
 
 def asked_box(run, numbers):

@@ -53,6 +53,15 @@ def positive(text):
     return number
 
 
+def length(text):
+    """The type of an option that is a length above 0, in metres or with the unit mm or um behind it."""
+    number, unit = re.fullmatch(r"(.*?)(mm|um|m)?", text, re.S).groups()
+    try:
+        return positive(number) * {"mm": 1e-3, "um": 1e-6}.get(unit, 1.0)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(f"'{plain(text)}': expected a number > 0, with the unit m, mm or um or without one") from None
+
+
 def finite(text):
     """The type of an option that is a finite number."""
     try:

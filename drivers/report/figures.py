@@ -39,9 +39,9 @@ def thinned(x, y):
     return x[chosen], y[chosen]
 
 
-def panel(history, label, columns, goals=(), counts=False, places=False):
+def panel(history, label, columns, goals=(), counts=False, places=False, zeros=False):
     """A panel of columns, (name of the curve or None, values) each."""
-    return Panel(label, [(*thinned(history.time, values), name) for name, values in columns[:MOST_CURVES]], goals, counts, places)
+    return Panel(label, [(*thinned(history.time, values), name) for name, values in columns[:MOST_CURVES]], goals, counts, places, zeros)
 
 
 # ---- curves
@@ -51,14 +51,14 @@ def accuracy_panels(history, solvers):
     panels, (_, solver) = [], solvers[-1]
     if "velocity_error" in history and numpy.isfinite(error_ratio(history)).any():
         goals = [(goal, f"goal from step {first} on" if first > 0 else "goal") for first, goal in goals_of(solvers) if numpy.isfinite(goal)]
-        panels.append(panel(history, "velocity error / U", [(None, error_ratio(history))], goals))
+        panels.append(panel(history, "velocity error / U", [(None, error_ratio(history))], goals, zeros=True))
     if "residual" in history:
         tolerance = number(solver, "tolerance", None)
-        panels.append(panel(history, "residual", [(None, history.residual)], [(float(tolerance), "tolerance")] if tolerance else []))
+        panels.append(panel(history, "residual", [(None, history.residual)], [(float(tolerance), "tolerance")] if tolerance else [], zeros=True))
     if "iterations" in history:
         panels.append(panel(history, "iterations", [(None, history.iterations)], counts=True))
     if "max_overlap" in history:
-        panels.append(panel(history, "largest overlap [m]", [(None, history.max_overlap)]))
+        panels.append(panel(history, "largest overlap [m]", [(None, history.max_overlap)], zeros=True))
     return panels
 
 
@@ -67,9 +67,9 @@ def motion_panels(history):
     terms = [name for name in ("potential_energy", "dissipated_normal", "dissipated_friction", "elastic_energy", "boundary_work") if name in history]
     panels = []
     if "kinetic_energy" in history:
-        panels.append(panel(history, "kinetic energy [J]", [(None, history.kinetic_energy)]))
+        panels.append(panel(history, "kinetic energy [J]", [(None, history.kinetic_energy)], zeros=True))
     if terms:
-        panels.append(panel(history, "energies [J]", [(name.replace("_", " "), history[name]) for name in terms]))
+        panels.append(panel(history, "energies [J]", [(name.replace("_", " "), history[name]) for name in terms], zeros=True))
     if "contacts" in history:
         panels.append(panel(history, "contacts", [(None, history.contacts)], counts=True))
     if "grains" in history and numpy.ptp(history.grains) > 0:

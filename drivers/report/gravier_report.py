@@ -19,6 +19,7 @@ import figures  # noqa: E402
 import page  # noqa: E402
 import verdict  # noqa: E402
 from asked import asked_rows, changed_rows, key_reference  # noqa: E402
+from gravier.histories import read_history  # noqa: E402
 from one_line import OneLineParser, plain, run_tool  # noqa: E402
 from run_log import STATUSES, RunLog  # noqa: E402
 from whole_file import claim, written  # noqa: E402
@@ -44,7 +45,7 @@ class Folder:
         except OSError as reason:
             self.notes.append(f"run.log: {reason.strerror}.")
         self.log = RunLog(text)
-        self.history = self._read(lambda: gravier.read_table(self.directory / "history.csv", ("step", "time")), gravier.Table())
+        self.history = self._read(lambda: read_history(self.directory), gravier.Table())
         self.run = self._read(lambda: gravier.Run(self.directory), None)
         if self.run:
             self._read(self._read_states, None)

@@ -106,7 +106,8 @@ def main():
     parser.add_argument("--steps", type=whole(10), help=f"steps of a run ({FULL['steps']})")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path("out/loop"), help="directory of the table and the runs; default: out/loop")
     options = sized(parser.parse_args(), FULL, QUICK)
-    out = claimed(options.out.resolve())
+    options.out = options.out.resolve()
+    out = claimed(options.out)
     lengths = (options.steps // 5, options.steps)
     seconds = np.empty((2, options.pairs, 2))
     for pair in range(options.pairs):

@@ -14,6 +14,7 @@ try:
     import numpy as np
 
     import gravier
+    from gravier import histories
     from gravier.case import ENVIRONMENT
     from gravier.tables import write_table as write_csv
 except ImportError as missing:
@@ -164,7 +165,7 @@ def run(directory, groups, boundaries=(), ranks=1, program=BINARIES / "gravier")
 
 def read_history(directory):
     """history.csv as {column: array}."""
-    return gravier.read_table(Path(directory) / "history.csv")
+    return histories.read_history(Path(directory))
 
 
 def error_of(values, parts=8):

@@ -5,6 +5,8 @@ import shutil
 import subprocess
 import time
 
+import numpy as np
+
 from gravier_runs import ENVIRONMENT, MPIEXEC, PATIENCE, PROGRAMS, SOURCE, RunTestCase, gravier, namelist, read_csv, write
 
 JOBS = os.path.join(SOURCE, "drivers", "jobs")
@@ -214,7 +216,7 @@ class Jobs(RunTestCase):
         self.assertEqual(lines[3], "t_3,changed,0.7,c,,,")
         self.assertEqual(self.sh(*table, "--mean", "12", "t.nml").stdout.splitlines()[2], "t_2,unfinished,0.3,b,,,")
         for arguments, words in (((*job, "--table", "contacts,weight", "t.nml"), "history.csv: no column weight; expected one of step,time,contacts"),
-                                 ((*table, "--mean", "13", "t.nml"), "t_1/history.csv: 12 rows; expected 13 at least"), ((*table, "--mean", "0", "t.nml"), "--mean 0: expected a number of steps"),
+                                 ((*table, "--mean", "13", "t.nml"), "t_1/history.csv: 12 steps; expected 13 at least"), ((*table, "--mean", "0", "t.nml"), "--mean 0: expected a number of steps"),
                                  ((*job, "--mean", "3", "t.nml"), "--mean 3: expected --table COLUMNS too"), (("gravier_job", "--table", "a", "t.nml"), "--table a: expected --list LIST.csv too"),
                                  ((*table, "--row", "9", "t.nml"), "no row 9")):
             done = self.sh(*arguments)
@@ -222,6 +224,44 @@ class Jobs(RunTestCase):
             self.assertIn(words, done.stderr)
         done = self.sh(*table, "t.nml", GRAVIER_PROGRAM="gravier_sample")
         self.assertIn("samples have no history.csv", done.stderr)
+
+    def test_a_table_of_thinned_histories(self):
+        """Sums, means, largest and least values over steps, of all rows or of thinned ones: a row stands for the steps since the row before it, and counts are those of all steps."""
+        write(os.path.join(self.work, "h.csv"), "every\n1\n9\n")
+        write(os.path.join(self.work, "h.nml"), namelist({**CASE, "output": {"directory": "@run@", "every": 0, "history_every": "@every@"}}).replace("'@every@'", "@every@"))
+        job = ("gravier_job", "--list", "h.csv")
+        self.assertEqual(self.sh(*job, "h.nml").returncode, 0)
+        step = np.arange(1, 51)
+        full = {"step": step, "time": 1e-3 * step, "left": (step % 17 == 0) * 2, "converged": 1 - (step == 20), "force_x:max": np.round(100.0 * np.sin(step)), "stress": step**2}
+        place = np.arange(50)
+        for k, every in ((1, 1), (2, 9)):
+            rows = (step % every == 0) | np.isin(step, (1, 50)) | (full["left"] > 0) | (full["converged"] == 0)
+            write(os.path.join(self.work, f"h_{k}", "history.csv"), "\n".join(",".join(map(str, row)) for row in [full, *zip(*(values[rows] for values in full.values()))]) + "\n")
+            # the row that stands for each step
+            row = place[rows][np.searchsorted(step[rows], step)]
+            known = {name: values if name in ("left", "converged") else values[row] for name, values in full.items()}
+            force = known["force_x:max"]
+            blocks, late = force.reshape(5, 10).mean(axis=1), force[23:43].reshape(2, 10).mean(axis=1)
+            for options, asked in (
+                    ((), {"sum:left": 4, "max:force_x:max": force.max(), "min:force_x:max": force.min(), "stress": 2500, "sum:converged": 49, "mean:force_x:max": force.mean(), "sum:stress": known["stress"].sum()}),
+                    (("--since", "0.0235"), {"sum:left": 2, "sum:converged": 27, "max:stress": 2500, "min:force_x:max": force[23:].min(), "mean:force_x:max": force[23:].mean(), "left": 0}),
+                    (("--since", "0.023"), {"sum:stress": known["stress"][23:].sum()}),
+                    (("--mean", "10"), {"max:force_x:max": blocks.max(), "min:force_x:max": blocks.min(), "stress": known["stress"][-10:].mean(), "left": 0, "sum:left": 4, "max:left": 0.2}),
+                    (("--mean", "33"), {"left": 2.0 / 33.0, "converged": 32.0 / 33.0, "stress": known["stress"][-33:].mean()}),
+                    (("--mean", "10", "--since", "0.0235"), {"max:force_x:max": late.max(), "min:force_x:max": late.min(), "min:converged": 1.0}),
+                    (("--mean", "50"), {"converged": 0.98, "force_x:max": force.mean()})):
+                done = self.sh(*job, "--table", ",".join(asked), *options, "--row", str(k), "h.nml")
+                self.assertEqual(done.stderr, "")
+                header, cells = (line.split(",") for line in done.stdout.splitlines())
+                self.assertEqual((header[3:], cells[:4]), (["step", *asked], [f"h_{k}", "0", str(every), "50"]))
+                for name, cell in zip(asked, cells[4:]):
+                    self.assertAlmostEqual(float(cell), asked[name], delta=1e-8 * (1.0 + abs(asked[name])), msg=f"{name} {options} {every}")
+            for arguments, words in ((("max:a",), "no column a; expected one of step,time"), (("max:stress", "--since", "0.05"), "history.csv: 0 steps after 0.05 s; expected 1 at least"),
+                                     (("max:stress", "--since", "0.0235", "--mean", "30"), "27 steps after 0.0235 s; expected 30 at least"), (("stress", "--since", "x"), "--since x: expected a time [s]")):
+                done = self.sh(*job, "--table", *arguments, "--row", str(k), "h.nml")
+                self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (2, "", 1), done.stderr)
+                self.assertIn(words, done.stderr)
+        self.assertIn("--since 1: expected --table COLUMNS too", self.sh(*job, "--since", "1", "h.nml").stderr)
 
     def test_a_signal_to_the_job(self):
         """SIGTERM to the job stops the ranks, which write a checkpoint; the job ends after them, and no further row runs."""

@@ -34,23 +34,31 @@ class Axes(unittest.TestCase):
         self.assertEqual(scale, "log")
         self.assertGreater(low, 1e-7)
         self.assertEqual(curve_pictures.limits_of(np.geomspace(1e-4, 1.0, 41), logarithms=False)[:2], ("linear", 0.0))
+        # a value of 0 has no logarithm
+        growing = np.append(0.0, np.geomspace(1e-4, 1.0, 41))
+        self.assertEqual(curve_pictures.limits_of(growing)[:2], ("linear", 0.0))
+        self.assertEqual(curve_pictures.limits_of(growing, zeros=True)[0], "log")
 
     def test_labels(self):
         for name, dimension, label in (("kinetic_energy", 2, "kinetic energy [J]"), ("max_overlap", 2, "largest overlap [m]"), ("contacts", 2, "contacts"),
                                        ("layers_pressure", 2, "layers pressure [N/m]"), ("stress_xx", 3, "stress xx [Pa]"),
-                                       ("force_x:lid", 3, "force x:lid [N]"), ("moment_z:drum", 2, "moment z:drum [N m]"), ("power:drum", 2, "power:drum [W]"),
-                                       ("spin_z:drum", 3, "spin z:drum [rad/s]"), ("velocity_x:lid", 3, "velocity x:lid [m/s]"), ("energy_error", 2, "energy error [J]"),
+                                       ("force_x:lid", 3, "force x on lid [N]"), ("moment_z:drum", 2, "moment z on drum [N m]"), ("power:drum", 2, "power of drum [W]"),
+                                       ("spin_z:drum", 3, "spin z of drum [rad/s]"), ("velocity_x:lid", 3, "velocity x of lid [m/s]"), ("body_omega:12", 2, "spin of body 12 [rad/s]"), ("body_fx:12", 2, "force x on body 12 [N]"), ("body_y:3", 2, "place y of body 3 [m]"), ("left", 2, "grains that leave in a step"), ("dissipated_friction", 2, "dissipated by friction [J]"), ("force_max", 3, "largest normal force [N]"), ("energy_error", 2, "energy error [J]"),
                                        ("layers_velocity_x", 2, "layers velocity x [m/s]"), ("layers_volume", 3, "layers volume [m³]"),
                                        ("load_work", 2, "load work [J]"), ("boundary_work", 3, "boundary work [J]"),
-                                       ("force_x:hard_work", 2, "force x:hard work [N]")):
+                                       ("force_x:hard_work", 2, "force x on hard work [N]")):
             self.assertEqual(curve_pictures.label_of(name, dimension), label)
         for name, label in (("stress_xx", "stress xx [N/m in 2D, Pa in 3D]"), ("kinetic_energy", "kinetic energy [J]")):
             self.assertEqual(curve_pictures.label_of_all(name, [3, 2, 3]), label)
         figure, axes = plt.subplots()
         curve_pictures.Panel("energy [J]", [(np.arange(99), np.geomspace(1e-3, 1.0, 99), "a"), (np.arange(99), np.zeros(99), "b"),
-                                            (np.arange(2), np.array([1.0, 1e-30]), "c")]).draw(axes)
+                                            (np.arange(2), np.array([1.0, 1e-30]), "c")], zeros=True).draw(axes)
         self.assertEqual([text.get_text() for text in axes.get_legend().get_texts()], ["a", "b: 0", "c"])
         self.assertEqual([text.get_text() for text in axes.texts], ["values go down to 1e-30"])
+        plt.close(figure)
+        figure, axes = plt.subplots()
+        curve_pictures.Panel("residual", [(np.arange(42), np.append(0.0, np.geomspace(1e-4, 1.0, 41)), None)], zeros=True).draw(axes)
+        self.assertEqual([text.get_text() for text in axes.texts], ["values go down to 0"])
         plt.close(figure)
         figure, axes = plt.subplots()
         curve_pictures.fit_axis(axes.yaxis, np.array([0.0, 25000.0]), "pressure [Pa]")
@@ -64,7 +72,7 @@ class Axes(unittest.TestCase):
         for text, values, label in (("stress_xy", [1.0, -2.0, 3.0], "stress xy [Pa]"), ("-stress_xy", [-1.0, 2.0, -3.0], "−stress xy [Pa]"),
                                     ("stress_xy/stress_yy", [0.5, -0.5, np.nan], "stress xy / stress yy"),
                                     ("-stress_xy/stress_yy", [-0.5, 0.5, np.nan], "−stress xy / stress yy"),
-                                    ("force_y:a/b-c", [1.0, 1.0, 1.0], "force y:a/b-c [N]"),
+                                    ("force_y:a/b-c", [1.0, 1.0, 1.0], "force y on a/b-c [N]"),
                                     ("coordination/stress_yy", [2.0, 1.0, np.nan], "coordination /\nstress yy [1/(Pa)]"),
                                     ("kinetic_energy/max_overlap", [0.5, 1.0, 1.5], "kinetic energy /\nlargest overlap [J/(m)]")):
             curve = curve_pictures.Curve(text, history)
@@ -74,8 +82,8 @@ class Axes(unittest.TestCase):
         # a difference; signs in names of boundaries are none where the names around another sign are columns
         history["force_y:c-d"] = np.array([1.0, 5.0, 2.0])
         for text, values, label in (("stress_yy-stress_xy", [1.0, 6.0, -3.0], "stress yy − stress xy [Pa]"), ("-stress_xy-stress_yy", [-3.0, -2.0, -3.0], "−stress xy − stress yy [Pa]"),
-                                    ("force_y:c-d-force_y:a/b-c", [0.0, 4.0, 1.0], "force y:c-d −\nforce y:a/b-c [N]"),
-                                    ("force_y:a/b-c/force_y:c-d", [1.0, 0.2, 0.5], "force y:a/b-c /\nforce y:c-d")):
+                                    ("force_y:c-d-force_y:a/b-c", [0.0, 4.0, 1.0], "force y on c-d −\nforce y on a/b-c [N]"),
+                                    ("force_y:a/b-c/force_y:c-d", [1.0, 0.2, 0.5], "force y on a/b-c /\nforce y on c-d")):
             curve = curve_pictures.Curve(text, history)
             np.testing.assert_array_equal(curve.values(history), values, text)
             self.assertEqual(curve.label([3]), label)
@@ -83,12 +91,24 @@ class Axes(unittest.TestCase):
         with self.assertRaisesRegex(curve_pictures.PictureError, r"kinetic_energy-stress_xy: a difference of \[J\] and \[Pa\]; expected columns of one unit"):
             curve_pictures.Curve("kinetic_energy-stress_xy", history).label([3])
 
+    def test_along(self):
+        """Numbers of the axis that rows lie along have a power of ten beside its unit; residuals have logarithms, and forces that begin at 0 none."""
+        step = np.arange(50.0)
+        history = gravier.Table({"time": step, "stress_yy": 4e4 * step, "force_y:lid": step**3, "residual": 10.0**(-0.1 * step) * (step > 0), "contacts": step**3})
+        run = SimpleNamespace(directory=pathlib.Path("run"), dimension=3, history=lambda: history)
+        figure = curve_pictures.draw_history([run], ["force_y:lid", "residual", "contacts"], "stress_yy")
+        self.assertEqual([axes.get_yscale() for axes in figure.axes], ["linear", "log", "linear"])
+        self.assertEqual(figure.axes[-1].get_xlabel(), "stress yy [$10^{6}$ Pa]")
+        self.assertEqual(figure.axes[-1].xaxis.get_major_formatter()(1.5e6, 0), "1.5")
+        self.assertEqual(curve_pictures.draw_history([run], ["contacts"]).axes[0].get_xlabel(), "time [s]")
+        plt.close("all")
+
     def test_window(self):
         """Rows after a time and up to another one, before means are taken; a window without rows is named with the times that there are."""
         times = np.arange(1, 11) / 10.0
         run = SimpleNamespace(directory=pathlib.Path("run"), dimension=2, history=lambda: gravier.Table({"time": times, "contacts": 10.0 * times}))
         for window, rows, drawn in (((None, None), 1, times), ((0.3, None), 1, times[3:]), ((None, 0.3), 1, times[:3]), ((0.2, 0.6), 1, times[2:6]), ((0.2, 0.6), 2, [0.35, 0.55])):
-            x, y = curve_pictures.draw_history([run], ["contacts"], rows=rows, window=window).axes[0].lines[0].get_data()
+            x, y = curve_pictures.draw_history([run], ["contacts"], mean=rows, window=window).axes[0].lines[0].get_data()
             np.testing.assert_allclose(x, drawn, rtol=1e-14)
             np.testing.assert_allclose(y, 10.0 * np.asarray(drawn), rtol=1e-14)
         plt.close("all")

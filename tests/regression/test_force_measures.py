@@ -394,6 +394,11 @@ class Runs(RunTestCase):
         heights = [bar.get_height() for bar in figure.axes[1].patches]
         np.testing.assert_allclose(heights, np.tile(directions.contacts, 2), rtol=1e-12)
         self.assertEqual([len(axes.patches) for axes in figure.axes[1:]], [36] * 3)
+        # without friction there are no tangential forces
+        tables = [gravier.Table({**table, "tangential": 0.0 * table["tangential"]}) for table in (gravier.force_distribution(run), directions)]
+        figure = draw_forces(*tables, 1.25, 2)
+        self.assertEqual([axes.get_title() for axes in figure.axes], ["", "contacts", "normal forces\nover their mean"])
+        self.assertEqual([text.get_text() for text in figure.axes[0].get_legend().get_texts()], ["normal forces", "exp(-1.25 f), fitted from 1 to 5"])
 
 
 if __name__ == "__main__":

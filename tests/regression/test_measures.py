@@ -10,6 +10,7 @@ import numpy as np
 from forked_scripts import script
 from gravier_runs import ENVIRONMENT, SOURCE, RunTestCase, run_case, write
 import gravier
+from gravier.histories import History
 from gravier.linked_grains import components, near_pairs
 from gravier.mixing import lacey, split_radius
 from gravier.wall_tests import sine_of_means
@@ -81,8 +82,12 @@ class Mixing(unittest.TestCase):
         self.assertEqual(len(gravier.mixing(States(bed, mirrored, mixed), by="y", since=0.15)), 1)
         fed = States(bed, mirrored)
         fed.case = {**fed.case, "insertion": [{}]}
-        with self.assertRaisesRegex(gravier.ResultsError, "mixing by y of grains that enter while it goes on, .* expected a run without &insertion, or mixing by size or material"):
+        np.testing.assert_allclose(gravier.mixing(fed, by="y").segregation, [1.0, -1.0], rtol=1e-12, err_msg="a case in which grains could enter, but did not")
+        fed.states.insert(0, gravier.Table({name: values[:-2] for name, values in fed.states[0].items()}))
+        fed.steps, fed.times = np.arange(3), 0.1 * np.arange(3)
+        with self.assertRaisesRegex(gravier.ResultsError, "grain 399 has entered after the first state, of step 0, and has no place y in it; expected mixing by size or material, or a time"):
             gravier.mixing(fed, by="y")
+        self.assertEqual(len(gravier.mixing(fed, by="y", since=0.05)), 2)
 
     def test_sizes_and_materials(self):
         """Large grains under small ones have -1, by volume; the same kinds by material."""
@@ -117,12 +122,19 @@ class Mixing(unittest.TestCase):
 
     def test_refusals(self):
         run = States(grid(4, 4))
-        for words, options in (("no written state has grains of both kinds by size", {}), ("by 'q': expected one of size, material, x, y", {"by": "q"}),
+        run.states[0]["material"] = np.ones(16, dtype=int)
+        for words, options in (("states: all grains have radii of 0.01 m; expected two sizes or places, or another of --by size, material, x, y$", {}), ("by 'q': expected one of size, material, x, y", {"by": "q"}),
+                               ("each written state are of one kind, and have radii of 0.01 to 0.01 m; expected a value that divides them, and not 0.5$", {"value": 0.5}),
+                               ("each written state are of one kind, and began at y = 0.01 to 0.07 m; expected a value that divides them, and not 3$", {"by": "y", "value": 3}),
+                               ("each written state are of one kind, of the materials sand; expected grains of material steel and others together$", {"by": "material"}),
                                ("material 'gold'; expected one of sand, steel", {"by": "material", "value": "gold"}),
                                ("cell -1: expected a length above 0", {"by": "x", "cell": -1}), ("x 'a': expected a number", {"by": "x", "value": "a"}),
                                ("no written state from 3 s on; expected a time of at most 0 s", {"by": "x", "since": 3.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.mixing(run, **options)
+        run.case = {"material": [{"name": "sand"}]}
+        with self.assertRaisesRegex(gravier.ResultsError, "mixing by material of a case whose only material is sand; expected a second &material, or mixing by size or by x, y, where"):
+            gravier.mixing(run, by="material")
 
 
 def wedge(degrees, half, dimension=2):
@@ -307,7 +319,7 @@ class Sheared(States):
         self.columns = columns
 
     def history(self):
-        return gravier.Table(self.columns)
+        return History(self.columns)
 
 
 class WallTests(RunTestCase):
@@ -394,8 +406,8 @@ class WallTests(RunTestCase):
             np.testing.assert_allclose(found.lateral_strain_x, 1.0 - wide / wide[0], atol=1e-12)
             np.testing.assert_allclose(found.volumetric_strain, 1.0 - wide * high / (wide * high)[0], atol=1e-12)
             np.testing.assert_allclose(found.void_ratio, wide * high / (np.pi * R**2) - 1.0, rtol=1e-12)
-        for words, options in (("20 rows after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
-                               ("0 rows after 9 s", {"since": 9.0})):
+        for words, options in (("20 steps after 0 s; expected 30", {"mean": 30}), ("axial 'z'", {"axial": "z"}), ("lateral 'y'", {"lateral": "y"}),
+                               ("0 steps after 9 s", {"since": 9.0})):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.wall_test(run, **options)
         thin = self.squeezed("thin", boundaries=sides, more={"history_every": 7})
@@ -404,7 +416,8 @@ class WallTests(RunTestCase):
         for name in ("axial_strain", "lateral_strain_x", "volumetric_strain"):
             np.testing.assert_array_equal(found[name], whole[name][found.step.astype(int) - 1])
         np.testing.assert_array_equal(gravier.wall_test(thin, since=0.0065).step, [7, 14, 20])
-        with self.assertRaisesRegex(gravier.ResultsError, r"thin/history.csv: no row of step 10, the first one after 0.0095 s, to which strains refer; expected one, as"):
+        with self.assertRaisesRegex(gravier.ResultsError, r"thin/history.csv: no row and no written state of step 10, the first one after 0.0095 s, to "
+                                    r"which strains refer; expected a time before a step that has one, such as 0.0065 s, before step 7$"):
             gravier.wall_test(thin, since=0.0095)
         with self.assertRaisesRegex(gravier.ResultsError, r"no column position_x:low x; &output boundary_forces"):
             gravier.wall_test(self.squeezed("no forces", more={"boundary_forces": False}))
@@ -508,8 +521,8 @@ class Command(RunTestCase):
                 getattr(gravier.outflow(run, 400), name)
             with self.assertRaisesRegex(KeyError, words):
                 gravier.outflow(run, 400)[name]
-        for options, words in (({"mean": 0}, "mean 0: expected a whole number of rows above 0"), ({"mean": 401}, "400 rows after 0 s; expected 401 at least"),
-                               ({"since": 0.4}, "0 rows after 0.4 s; expected 1 at least")):
+        for options, words in (({"mean": 0}, "mean 0: expected a whole number of steps above 0"), ({"mean": 401}, "400 steps after 0 s; expected 401 at least"),
+                               ({"since": 0.4}, "0 steps after 0.4 s; expected 1 at least")):
             with self.assertRaisesRegex(gravier.ResultsError, words):
                 gravier.outflow(run, **options)
         done = script(os.path.join(SOURCE, "drivers/measure/gravier_measure.py"), "outflow", "out", "--mean", "400", directory=self.scratch, environment=ENVIRONMENT)
@@ -537,8 +550,8 @@ class Command(RunTestCase):
         runs = [gravier.Run(os.path.join(self.directory, "results"))]
         figure = draw_history(runs, None, table="heap.csv")
         self.assertEqual([axes.get_ylabel() for axes in figure.axes if "low" not in axes.get_ylabel()],
-                         ["height [m]", "front high [m]", "length [m]", "run out", "angle high [degrees]"])
-        self.assertEqual([axes.get_ylabel() for axes in draw_history(runs, ["run_out"], table="heap.csv").axes], ["run out"])
+                         ["height [m]", "front high [m]", "length [m]", "run-out", "angle high [degrees]"])
+        self.assertEqual([axes.get_ylabel() for axes in draw_history(runs, ["run_out"], table="heap.csv").axes], ["run-out"])
         done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "heap.csv", directory=self.directory, environment=ENVIRONMENT)
         self.assertEqual((done.returncode, done.stdout, done.stderr), (0, "results/heap.png\n", ""))
         done = script(os.path.join(SOURCE, "drivers/plot/gravier_plot.py"), "history", "results", "--table", "walls.csv", directory=self.directory, environment=ENVIRONMENT)
@@ -574,7 +587,7 @@ class Command(RunTestCase):
                                  (["heap", "results", "--out", "results/history.csv"], "history.csv: there is a file of another kind or origin"),
                                  (["heap", "results", "--out", "heap.txt"], "heap.txt: expected a name that ends in .csv"),
                                  (["heap", "nothing"], "nothing/results.h5: no such file"), (["walls", "results"], "no column position_x:left; &output boundary_forces = .true. writes it"),
-                                 (["mixing", "results", "--by", "material"], "results.h5: no second material; expected one of none, the case has no &material"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
+                                 (["mixing", "results", "--by", "material"], "results.h5: mixing by material of a case without &material, whose grains are of one material; expected a second &material, or mixing by size"), (["heap", "results", "--width", "-1"], "expected a number > 0"),
                                  (["walls", "results", "--mean", "0"], "expected an integer >= 1"),
                                  (["outflow", "results"], "no column left_mass; expected a run with a boundary of shape outlet"), (["heap", "results", "--floor", "nan"], "'nan': expected a number")):
             with self.subTest(arguments=arguments):

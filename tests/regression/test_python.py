@@ -103,7 +103,7 @@ class Package(RunTestCase):
         means, every = run.history().means(70), run.history().kinetic_energy
         self.assertEqual(len(means), 4)
         np.testing.assert_allclose(means.kinetic_energy, [every[70 * k:70 * (k + 1)].mean() for k in range(4)], rtol=1e-15)
-        with self.assertRaisesRegex(gravier.ResultsError, "means of 301 rows; expected 1 to 300, the rows that there are"):
+        with self.assertRaisesRegex(gravier.ResultsError, "means of 301 steps; expected 1 to 300, the steps that there are"):
             run.history().means(301)
         self.assertEqual(run.verdict(), "converged")
         self.assertEqual(set(run.trace().step), set(range(1, 301)))

@@ -61,7 +61,7 @@ class Sieve(RunTestCase):
         np.testing.assert_allclose(table.passing, [0.0, 300.0 / 7.0, 300.0 / 7.0, 100.0], rtol=1e-12)
         np.testing.assert_array_equal(table.grains, [0, 30, 30, 40])
         self.assertEqual((sizes.D10[0], sizes.D50[0], sizes.C_u[0]), (0.02, 0.04, 2.0))
-        done = self.measure("two.csv", "--sieves", "0.02", "0.03")
+        done = self.measure("two.csv", "--sieves", "20mm", "0.03")
         self.assertEqual(done.stdout, "D10 0.02 m, D30 0.02 m, D50 0.04 m, D60 0.04 m, C_u 2, C_c 0.5\ntwo_sieve.csv\n")
         with open(self.here("two_sieve.csv")) as file:
             self.assertEqual(file.read(), "size,passing,grains\n0.02,42.8571429,30\n0.03,42.8571429,30\n")
@@ -85,7 +85,7 @@ class Sieve(RunTestCase):
         self.assertEqual(done.stdout.splitlines()[1:], ["stones/sieve.csv", "sieve.png"])
         self.assertGreater(os.path.getsize(self.here("sieve.png")), 5000)
         for arguments, words in ((["stones/final_bodies.h5"], "stones/final_bodies.h5: bodies with shapes, whose volumes this file does not have; expected the directory of a run"),
-                                 (["stones", "--step", "7"], "no step 7; expected one of 0, 1, 2"), (["nothing.h5"], "nothing.h5"), (["stones", "--sieves", "0"], "'0': expected a number > 0")):
+                                 (["stones", "--step", "7"], "no step 7; expected one of 0, 1, 2"), (["nothing.h5"], "nothing.h5"), (["stones", "--sieves", "0"], "'0': expected a number > 0"), (["stones", "--sieves", "3km"], "'3km': expected a number > 0, with the unit m, mm or um or without one")):
             self.assertIn(words, self.measure(*arguments, status=2).stderr)
         for group, name in (("sample", "grain_shapes"), ("sample", "grain_shares"), ("scene", "shapes")):
             del case[group][name]

@@ -131,6 +131,19 @@ class Rebound(SmallScene):
                             [(1 - 2 * e) / 3, (1 + e) / 3, (1 + e) / 3], 1e-10)
         self.both(check)
 
+    def test_cradle_of_five(self):
+        """Five balls, the first strikes with v0: in touch it bounces back with 0.6 v0 and the others go on together with 0.4 v0; with gaps between them the impacts follow each
+        other, and the last one alone goes on with v0. Both keep momentum and energy."""
+        def check(dimension):
+            along, speed = unit(dimension, 0), 0.125
+            for name, gap, wanted in (("in touch", 0.0, [-0.6, 0.4, 0.4, 0.4, 0.4]), ("with gaps", 2.0**-20, [0.0, 0.0, 0.0, 0.0, 1.0])):
+                balls = [Grain((k * (1.0 + gap) - (0.0625 if k == 0 else 0.0)) * along, (speed if k == 0 else 0.0) * along, radius=0.5) for k in range(5)]
+                record = self.play(f"cradle of five {name} {dimension}", balls, steps=600, scene={"restitution": 1.0, "alert_distance": 0.01})
+                v = record.velocity[-1, :, 0] / speed
+                self.verify(f"five balls {name}, {dimension}D", "v / v0", v, wanted, 1e-9)
+                self.verify(f"five balls {name}, {dimension}D", "energy over that before", np.sum(v**2), 1.0, 1e-9)
+        self.both(check)
+
 
 class Block(SmallScene):
     """Bodies that do not turn: rotation = .false."""

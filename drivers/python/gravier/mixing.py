@@ -25,7 +25,7 @@ def mixing(run, by="size", value=None, cell=None, since=0.0):
         bodies = free_grains(run, step)
         volume = run.volumes(bodies)
         if is_first is None and len(bodies):
-            is_first = _kind(run, bodies, by, value)
+            is_first = _kind(run, step, bodies, by, value)
             cell = _cell(run, bodies, cell)
         chosen = is_first(bodies) if is_first else np.zeros(0, dtype=bool)
         if chosen.all() or not chosen.any():
@@ -35,7 +35,7 @@ def mixing(run, by="size", value=None, cell=None, since=0.0):
         rows.append((step, time, lacey(number.ravel(), chosen), *heights(bodies.position[:, -1], volume, chosen, bodies.radius.mean()),
                      chosen.mean(), len(bodies), number.max() + 1))
     if not any(np.isfinite(row[5]) for row in rows):
-        raise ResultsError(f"{run.path}: no written state has grains of both kinds by {by}; expected two sizes, materials or sides, or another value")
+        raise ResultsError(f"{run.path}: {_only_kind(run, by, value, since)}")
     names = ("step", "time", "mixing", "height_difference", "segregation", "share", "grains", "cells")
     return Table({name: np.array(values) for name, values in zip(names, zip(*rows))})
 
@@ -97,8 +97,8 @@ def heights(height, volume, chosen, radius):
     return difference, difference / abs(largest) if largest != 0.0 else np.nan
 
 
-def _kind(run, bodies, by, value):
-    """The function that finds the grains of the first kind among bodies."""
+def _kind(run, step, bodies, by, value):
+    """The function that finds the grains of the first kind among bodies; `bodies` are the free ones of the first state, which is that of `step`."""
     if by == "material":
         number = _material(run, value)
         return lambda held: held.material == number
@@ -108,12 +108,33 @@ def _kind(run, bodies, by, value):
     axes = "xyz"[:run.dimension]
     if by not in tuple(axes):
         raise ResultsError(f"by {by!r}: expected one of size, material, {', '.join(axes)}")
-    if "insertion" in run.case:
-        raise ResultsError(f"{run.path}: mixing by {by} of grains that enter while it goes on, which have no place in its first state; expected a run without &insertion, or "
-                           "mixing by size or material")
-    place = bodies.position[:, axes.index(by)]
-    above = bodies.id[place > (np.median(place) if value is None else _number(value, by))]
-    return lambda held: np.isin(held.id, above)
+    limit, known = np.median(bodies.position[:, axes.index(by)]) if value is None else _number(value, by), run.bodies(step)
+    above = known.id[known.position[:, axes.index(by)] > limit]
+
+    def is_above(held):
+        late = held.id[~np.isin(held.id, known.id)]
+        if len(late):
+            raise ResultsError(f"{run.path}: grain {late[0]} has entered after the first state, of step {step}, and has no place {by} in it; expected mixing by size or material, or "
+                               "a time since at which all grains are there")
+        return np.isin(held.id, above)
+
+    return is_above
+
+
+def _only_kind(run, by, value, since):
+    """What all grains of the written states share, so that they are of one kind, and what was expected."""
+    states = [bodies for bodies in (free_grains(run, step) for step, _ in states_since(run, since)) if len(bodies)]
+    if not states:
+        return "no written state has grains; expected grains of two kinds"
+    if by == "material":
+        names = [group.get("name") for group in run.case.get("material", [])]
+        found = [names[number - 1] for number in np.unique(np.concatenate([bodies.material for bodies in states]))]
+        return f"the grains of each written state are of one kind, of the materials {', '.join(found)}; expected grains of material {names[_material(run, value) - 1]} and others together"
+    values, what = (states[0].position[:, "xyz".index(by)], f"began at {by} =") if by in tuple("xyz") else (np.concatenate([bodies.radius for bodies in states]), "have radii of")
+    low, high = values.min(), values.max()
+    if value is None and low == high:
+        return f"all grains {what} {low:.6g} m; expected two sizes or places, or another of --by size, material, {', '.join('xyz'[:run.dimension])}"
+    return f"the grains of each written state are of one kind, and {what} {low:.6g} to {high:.6g} m; expected a value that divides them" + ("" if value is None else f", and not {value}")
 
 
 def _size_limit(bodies, value):
@@ -132,8 +153,10 @@ def _material(run, value):
     except (TypeError, ValueError):
         number = 0
     if not 1 <= number <= len(names):
-        known = ", ".join(map(str, names)) or "none, the case has no &material"
-        raise ResultsError(f"{run.path}: {'no second material' if value is None else f'material {value!r}'}; expected one of {known}")
+        case = f"a case whose only material is {names[0]}" if len(names) == 1 else "a case without &material, whose grains are of one material"
+        if len(names) < 2:
+            raise ResultsError(f"{run.path}: mixing by material of {case}; expected a second &material, or mixing by size or by {', '.join('xyz'[:run.dimension])}, where grains were at the start")
+        raise ResultsError(f"{run.path}: material {value!r}; expected one of {', '.join(map(str, names))}")
     return number
 
 

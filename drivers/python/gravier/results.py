@@ -7,6 +7,7 @@ import numpy as np
 
 from .case import CaseError, entries
 from .checksum import is_whole
+from .histories import read_history
 from .run_words import doubts, verdict
 from .shapes import axes_of, ball, shapes_of
 from .starts import Start, starts_in, text_of
@@ -339,8 +340,8 @@ class Run:
             raise ResultsError(f"{self.directory / 'run.log'}: {reason.strerror}; expected the log of a run") from None
 
     def history(self):
-        """history.csv: a row a step. `history().means(100)` are the means of a hundred rows after each other: of steps, unless history_every is more than 1."""
-        return read_table(self.directory / "history.csv", ("step", "time"))
+        """history.csv: a row a step, or with history_every fewer. `history().means(100)` are the means of a hundred steps after each other."""
+        return read_history(self.directory)
 
     def trace(self):
         """trace.csv: a row a check of a solve; written with `trace = .true.`."""

@@ -25,6 +25,10 @@ class Table(dict):
     def __len__(self):
         return len(next(iter(self.values()))) if self.keys() else 0
 
+    def rows(self, chosen):
+        """The chosen rows."""
+        return Table({name: values[chosen] for name, values in self.items()})
+
     def means(self, rows):
         """The means of so many rows after each other, as a table; rows behind the last whole block are left out."""
         if rows < 1 or rows > len(self):
