@@ -38,6 +38,8 @@ SLOW_ACCURACY = 0.3
 #: what the publications say of disks, and of slow flow of spheres
 DISKS = {"mu": (0.25, 1.1), "phi": (0.81, -0.3)}
 SPHERES = {"mu": 0.357, "phi": 0.596}
+#: exponent of the friction of spheres in the third publication
+EXPONENT = 0.28
 #: accepted differences; that of the friction of the fastest flow, whose shocks are inelastic here
 NEAR, FAST, NEAR_FAST = {"mu": 0.05, "phi": 0.02}, 0.05, 0.12
 #: strain left out at the start, from the lattice and from the state of a faster flow
@@ -93,14 +95,20 @@ def flows(folder, dimension, strains):
     return [found[number] for number in strains]
 
 
+def with_exponent(n, numbers, values, errors):
+    """mu_0 and s of mu = mu_0 + s I^n by least squares, each value weighted by its standard error, and how far off each value is, in such errors."""
+    columns = np.stack([np.ones(len(numbers)), np.asarray(numbers)**n], axis=1) / np.asarray(errors)[:, None]
+    fit, *_ = np.linalg.lstsq(columns, values / errors, rcond=None)
+    return fit, columns @ fit - values / errors
+
+
 def power_law(numbers, values, errors):
     """mu_0, s and n of mu = mu_0 + s I^n by least squares, each value weighted by its standard error, n between 0.1 and 1.5; and the standard
     error of n, or more where the values scatter by more than their errors about the law."""
     exponents, misses, fits = np.linspace(0.1, 1.5, 281), [], []
     for n in exponents:
-        columns = np.stack([np.ones(len(numbers)), np.asarray(numbers)**n], axis=1) / np.asarray(errors)[:, None]
-        fit, *_ = np.linalg.lstsq(columns, values / errors, rcond=None)
-        misses.append(np.sum((columns @ fit - values / errors)**2))
+        fit, off = with_exponent(n, numbers, values, errors)
+        misses.append(np.sum(off**2))
         fits.append(fit)
     best = int(np.argmin(misses))
     near = exponents[misses <= misses[best] + max(1.0, misses[best] / max(1, len(numbers) - 3))]
@@ -120,6 +128,13 @@ def draw(path, found):
         ax.axhline(SPHERES[key], color="#D55E00", linestyle="--", linewidth=0.9, label="slow limit, Chialvo et al. 2012")
         ax.set_xscale("log")
         ax.set_xlabel("inertial number I")
+    rows = np.array(found[3])
+    if len(rows) > 3:
+        mu_0, s, n, _ = power_law(rows[:, 0], rows[:, 1], rows[:, 3])
+        hatano, _ = with_exponent(EXPONENT, rows[:, 0], rows[:, 1], rows[:, 3])
+        wide = np.geomspace(rows[:, 0].min(), rows[:, 0].max(), 100)
+        axes[0].plot(wide, mu_0 + s * wide**n, "-", color="#D55E00", linewidth=0.9, label=f"spheres, fitted, exponent {n:.2f}")
+        axes[0].plot(wide, hatano[0] + hatano[1] * wide**EXPONENT, ":", color="#D55E00", linewidth=1.2, label=f"exponent {EXPONENT} of Hatano 2007, fitted")
     axes[0].set_ylabel("friction of the flow, mu")
     axes[1].set_ylabel("solid fraction, phi")
     axes[0].legend(fontsize=8)
@@ -147,7 +162,7 @@ def compare(table, found):
     if len(found[3]) > 3:
         rows = np.array(found[3])
         mu_0, s, n, error = power_law(rows[:, 0], rows[:, 1], rows[:, 3])
-        table.add("spheres", f"exponent of mu = {mu_0:.3f} + {s:.2f} I^n, standard error {error:.0e}", n, 0.28)
+        table.add("spheres", f"exponent of mu = {mu_0:.3f} + {s:.2f} I^n, standard error {error:.0e}", n, EXPONENT)
 
 
 def main():
