@@ -84,12 +84,16 @@ def joined(path, rows):
 
 
 def page(rows):
-    """The overview as Markdown: a line a case, with the methods of fewest and most iterations and how the others ended."""
-    text = "\n| case | why it is hard | runs that converged | fewest, most iterations of all steps | how the others ended |\n"
+    """The overview as Markdown: the names of the cases that all methods solve, and of each other case a line with the methods of fewest and most
+    iterations and how the others ended."""
+    known = {name: [r for r in rows if r["case"] == name] for name in cases()}
+    solved = [name for name, own in known.items() if own and all(r["status"] == "converged" and not r["wrong"] for r in own)]
+    text = f"\nAll methods that serve them solve {len(solved)} of the {sum(map(bool, known.values()))} cases: {'; '.join(solved)}. These are the others:\n" if solved else ""
+    text += "\n| case | why it is hard | runs that converged | fewest, most iterations of all steps | how the others ended |\n"
     text += "|---|---|---:|---|---|\n"
     for name, case in cases().items():
-        own = [r for r in rows if r["case"] == name]
-        if not own:
+        own = known[name]
+        if not own or name in solved:
             continue
         converged = sorted((int(r["iterations"]), r["method"]) for r in own if r["status"] == "converged")
         ends = {}

@@ -387,6 +387,16 @@ class ClosingTable(unittest.TestCase):
             ball = {"example": "RIGID_3D/1SP_PL", "imports": "no", "steps": "", "status": "", "lacks": lacks}
             self.assertEqual(judged(study_lmgc90.accepted, [wall, ball])[0], status, lacks)
 
+    def test_page_of_hard_cases(self):
+        """Cases that all methods solve are named, and the others have a line each."""
+        names = list(study_hard.cases())[:3]
+        rows = [{"case": name, "method": method, "status": "converged", "wrong": "", "iterations": 10} for name in names for method in ("nlgs", "schwarz")]
+        rows[3]["status"], rows[5]["wrong"] = "not converged in 1 of 2 steps", "cone"
+        text = study_hard.page(rows)
+        self.assertIn(f"solve 1 of the 3 cases: {names[0]}. These", text)
+        self.assertEqual(re.findall(r"(?m)^\| (.*?) \|", text)[2:], names[1:])
+        self.assertIn("**cone**", text)
+
     def test_loop(self):
         good = {"ratio": 1.03, "error": 0.008, "differ": 0, "compared": 90}
         for quick in (False, True):
