@@ -27,6 +27,7 @@ TOOLS = {
     "profile": ["fclib/plot_fclib.py", "profile.csv", "--out"],
     "tiles": ["studies/tile_bodies.py", "bodies.h5"],
     "join": ["join/gravier_join.py", "bodies.h5", "bodies.h5", "--above", "0.1", "--out"],
+    "walls": ["rough_walls/gravier_rough_walls.py", "bodies.h5", "--depth", "0.2", "--sides", "-y", "--out"],
     "measure": ["measure/gravier_measure.py", "heap", "results", "--out"],
     "blocks": ["blocks/gravier_blocks.py", "wall", "--bricks", "2", "--courses", "2", "--size", "0.2", "0.1", "--out"],
 }
@@ -34,8 +35,8 @@ TOOLS = {
 WRONG_ENDINGS = [("report", name, ": expected a name that ends in .html") for name in ("results/results.h5", "results/history.csv", "case.nml")] + [
     (tool, "results/results.h5", ": expected a name that ends in .png or .svg") for tool in ("packing", "history", "profile")] + [
     ("tiles", "results/history.csv", ": expected a name that ends in .h5"), ("measure", "results/results.h5", ": expected a name that ends in .csv"),
-    ("join", "results/history.csv", ": expected a name that ends in .h5")]
-FOREIGN = [("tiles", "results/results.h5"), ("join", "results/results.h5"), ("report", "own.html"), ("packing", "own.png"), ("history", "own.svg"), ("movie", "own.gif"), ("profile", "own.png"),
+    ("join", "results/history.csv", ": expected a name that ends in .h5"), ("walls", "results/history.csv", ": expected a name that ends in .h5")]
+FOREIGN = [("tiles", "results/results.h5"), ("join", "results/results.h5"), ("walls", "results/results.h5"), ("report", "own.html"), ("packing", "own.png"), ("history", "own.svg"), ("movie", "own.gif"), ("profile", "own.png"),
            ("measure", "results/history.csv"), ("measure", "profile.csv"),
            ("blocks", "results/history"), ("blocks", "results/trace"), ("blocks", "case")]
 STAYS = ": there is a file of another kind or origin, which is not replaced; expected the name of no file, or of one that was made in the same way"
@@ -77,7 +78,7 @@ class OwnFiles(RunTestCase):
         before = self.files()
         self.assertLess({"results/results.h5", "results/history.csv", "results/trace.csv", "results/run.log", "case.nml"}, set(before))
         os.mkdir(os.path.join(self.work, "folder.html"))
-        places = [("tiles", "bodies.h5", ": this file is read; expected another name"), ("join", "bodies.h5", ": this file is read; expected another name"), ("report", "folder.html", ": there is a directory or a device"),
+        places = [("tiles", "bodies.h5", ": this file is read; expected another name"), ("join", "bodies.h5", ": this file is read; expected another name"), ("walls", "bodies.h5", ": this file is read; expected another name"), ("report", "folder.html", ": there is a directory or a device"),
                   ("report", "a" * 300 + ".html", ": File name too long; expected a file that can be written")]
         for tool, name, text in WRONG_ENDINGS + [(*one, STAYS) for one in FOREIGN] + places:
             with self.subTest(tool=tool, name=name):
@@ -91,7 +92,7 @@ class OwnFiles(RunTestCase):
     def test_own_files_are_replaced(self):
         """What a tool has made it makes anew, and an empty file is nobody's."""
         for tool, name in (("report", "a.html"), ("packing", "a.png"), ("packing", "a.svg"), ("movie", "a.gif"), ("profile", "b.png"), ("tiles", "a.h5"),
-                           ("blocks", "wall"), ("measure", "a.csv"), ("join", "b.h5")):
+                           ("blocks", "wall"), ("measure", "a.csv"), ("join", "b.h5"), ("walls", "c.h5")):
             write(os.path.join(self.work, name if tool != "blocks" else "wall.nml"), "")
             for time in range(2):
                 with self.subTest(tool=tool, name=name, time=time):

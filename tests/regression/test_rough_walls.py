@@ -5,7 +5,8 @@ import pathlib
 import h5py
 import numpy as np
 
-from gravier_runs import RunTestCase, run_case, write
+from forked_scripts import script
+from gravier_runs import SOURCE, RunTestCase, run_case, write
 import gravier
 
 RADIUS, COLUMNS, ROWS = 0.01, 8, 5
@@ -52,6 +53,27 @@ class RoughWalls(RunTestCase):
                         "time": {"step": 1e-3, "steps": 1}, "output": {"directory": "results"}}, 1, self.here(self.id()))
         self.assert_status(run, 0)
         self.assertIn(f"start       from forces of the bodies file: {len(pairs)} of its {len(pairs)} contacts touch in the first step", run.stdout)
+
+    def test_command(self):
+        """gravier_rough_walls writes the same file, with groups in the order of the sides, and refuses what the function refuses in one line."""
+        path = self.here(self.id(), "made.h5")
+        gravier.rough_walls(self.sample, path, {"+y": 1, "-y": 2})
+
+        def call(*arguments):
+            return script(os.path.join(SOURCE, "drivers/rough_walls/gravier_rough_walls.py"), *arguments, directory=self.here(self.id()))
+        done = call("sample.h5", "--sides", "+y,-y", "--out", "rough.h5")
+        self.assertEqual((done.returncode, done.stdout, done.stderr), (0, f"+y: group 1, {COLUMNS} grains\n-y: group 2, {COLUMNS} grains\nrough.h5\n", ""))
+        with h5py.File(path) as wanted, h5py.File(self.here(self.id(), "rough.h5")) as found:
+            for name in ("bodies/group", "walls/id", "contacts/candidate", "contacts/antagonist", "contacts/force"):
+                np.testing.assert_array_equal(found[name][()], wanted[name][()])
+        done = call("sample.h5", "--sides", "-y,+y", "--depth", "0.035", "--out", "rough.h5")
+        self.assertEqual(done.stdout, f"-y: group 1, {2 * COLUMNS} grains\n+y: group 2, {2 * COLUMNS} grains\nrough.h5\n")
+        for arguments, words in ((["--sides", "-y,-y"], "--sides -y,-y: a side twice; expected each side once"), (["--sides", "-z"], "side '-z': expected + or - and one of x, y"),
+                                 (["--sides", "-y", "--depth", "0"], "argument --depth: '0': expected a number > 0")):
+            done = call("sample.h5", *arguments, "--out", "none.h5")
+            self.assertEqual((done.returncode, done.stdout, done.stderr.count("\n")), (2, "", 1), done.stderr)
+            self.assertIn(f"gravier_rough_walls: error: {words}", done.stderr)
+            self.assertFalse(os.path.exists(self.here(self.id(), "none.h5")))
 
     def test_one_side(self):
         """Two rows along x; forces on a plane that stays keep it, whatever its place among the names."""

@@ -54,7 +54,7 @@ class Wheel(RunTestCase):
             wheel.extractall(site)
         shutil.rmtree(copy)
         self.assertTrue(any(path.endswith("LICENSE") for path in held))
-        for folder in ("plot", "report", "import", "blocks", "measure", "join"):
+        for folder in ("plot", "report", "import", "blocks", "measure", "join", "rough_walls"):
             for path in (DRIVERS / folder).glob("*.py"):
                 self.assertIn(f"gravier/scripts/{folder}/{path.name}", held)
         for path in (DRIVERS / "python/gravier").glob("*.py"):
@@ -66,6 +66,7 @@ class Wheel(RunTestCase):
                 ("gravier_report", ["run/results"], 0, "run/results/report.html"),
                 ("gravier_measure", ["heap", "run/results"], 0, "run/results/heap.csv"),
                 ("gravier_join", ["nothing.h5", "nothing.h5", "--out", "joined.h5"], 2, "gravier_join: error: nothing.h5: no such file"),
+                ("gravier_rough_walls", ["nothing.h5", "--sides", "-y", "--out", "rough.h5"], 2, "gravier_rough_walls: error: nothing.h5: no such file"),
                 ("gravier_blocks", ["wall", "--bricks", "2", "--courses", "2", "--size", "0.2", "0.1"], 0, "wall.shapes"),
                 ("gravier_import", ["nothing", "--step", "1e-3"], 2, "gravier_import: error: ")):
             # as the wheel's script in bin/ does

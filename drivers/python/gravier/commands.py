@@ -40,3 +40,7 @@ def gravier_plot():
 
 def gravier_report():
     _run("gravier_report")
+
+
+def gravier_rough_walls():
+    _run("gravier_rough_walls")
