@@ -352,11 +352,11 @@ def no_contact(played):
 
 
 def shared_by(n):
-    """Some body is held by n subdomains or more (the log lists multiplicities up to 7 one by one, then 8+)."""
+    """Some body is held by n subdomains or more (the log lists multiplicities up to 7 one by one, then 8 or more)."""
     def holds(played):
         if "subdomains" not in played.groups["decomposition"] or played.groups["solver"]["method"] == "nlgs":
             return []
-        return [] if f" {n}+: " in played.run.stdout else [f"no body is shared by {n} subdomains"]
+        return [] if f" in {n} or more subdomains" in played.run.stdout else [f"no body is shared by {n} subdomains"]
     return holds
 
 
