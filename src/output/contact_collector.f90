@@ -1,11 +1,16 @@
 !> The contacts of the last step of a simulation as a table of named fields, for whatever file is written of them.
 module gravier_contact_collector
   use gravier_kinds, only: dp, i8
-  use gravier_contact_kernels, only: contact_arms, lane_of, block_of
+  use gravier_body_store, only: body_set_t
+  use gravier_boundary, only: boundary_t
+  use gravier_neighbour_list, only: neighbour_list_t
+  use gravier_halo, only: local_bodies_t, halo_t
+  use gravier_contact_kernels, only: kernels_t, contact_arms, lane_of, block_of
   use gravier_contact_places, only: find_contact_place
   use gravier_contact_springs, only: find_elongation
   use gravier_contact_law, only: unused
   use gravier_subproblem, only: subproblem_t
+  use gravier_contact_problem, only: contact_problem_t
   use gravier_field_list, only: field_list_t
   use gravier_simulation, only: simulation_t
   implicit none
@@ -32,29 +37,31 @@ contains
     integer(i8), allocatable :: whole(:, :)
     integer :: s, k, first, last, n
 
-    associate (problem => simulation%problem, decomposition => simulation%decomposition)
+    associate (problem => simulation%problem, halo => simulation%halo, decomposition => simulation%decomposition)
       n = sum(problem%sub%n_contacts)
       call table%init("contacts", "candidate antagonist", n)
       last = 0
       do s = 1, size(problem%sub)
-        call take_keys(simulation, s, table%key(:, last + 1:last + problem%sub(s)%n_contacts))
+        call take_keys(problem%sub(s), halo%view(s)%list, halo%view(s)%bodies, decomposition%boundaries, &
+          & table%key(:, last + 1:last + problem%sub(s)%n_contacts))
         last = last + problem%sub(s)%n_contacts
       end do
       do k = 1, size(names)
-        if (components_of(trim(names(k)), simulation) == 0) cycle
+        if (components_of(trim(names(k)), problem, halo) == 0) cycle
         if (names(k) == "status") then
           allocate (whole(1, n))
         else
-          allocate (value(components_of(trim(names(k)), simulation), n))
+          allocate (value(components_of(trim(names(k)), problem, halo), n))
         end if
         last = 0
         do s = 1, size(problem%sub)
           first = last + 1
           last = last + problem%sub(s)%n_contacts
           if (allocated(whole)) then
-            call take_status(simulation, problem%sub(s), whole(1, first:last))
+            call take_status(problem%kernels, problem%sub(s), whole(1, first:last))
           else
-            call take_field(simulation, s, trim(names(k)), value(:, first:last))
+            call take_field(problem%kernels, problem%sub(s), halo%view(s), simulation%physics%h, trim(names(k)), &
+              & value(:, first:last))
           end if
         end do
         if (allocated(whole)) then
@@ -67,19 +74,20 @@ contains
   end subroutine collect_contacts
 
   !> Numbers of a contact in a field, 0 where the scene has none.
-  pure integer function components_of(name, simulation) result(n)
+  pure integer function components_of(name, problem, halo) result(n)
     character(len=*), intent(in) :: name
-    type(simulation_t), intent(in) :: simulation
+    type(contact_problem_t), intent(in) :: problem
+    type(halo_t), intent(in) :: halo
 
     select case (name)
     case ("normal", "impulse")
-      n = simulation%problem%nd
+      n = problem%nd
     case ("moment")
-      n = merge(2*simulation%problem%nd - 3, 0, simulation%problem%has_rolling())
+      n = merge(2*problem%nd - 3, 0, problem%has_rolling())
     case ("point")
-      n = merge(simulation%problem%nd, 0, simulation%problem%has_shapes())
+      n = merge(problem%nd, 0, problem%has_shapes())
     case ("elongation")
-      n = merge(simulation%problem%nd, 0, simulation%halo%memory%n_spring > 0)
+      n = merge(problem%nd, 0, halo%memory%n_spring > 0)
     case ("points")
       n = 6
     case default
@@ -113,76 +121,79 @@ contains
   end function is_scalar
 
   !> Identifiers of candidate and antagonist of the contacts of a subdomain of this rank.
-  subroutine take_keys(simulation, s, key)
-    type(simulation_t), intent(in) :: simulation
-    integer, intent(in) :: s
+  subroutine take_keys(sub, list, bodies, boundaries, key)
+    type(subproblem_t), intent(in) :: sub
+    !> its pairs, and the bodies that they name
+    type(neighbour_list_t), intent(in) :: list
+    type(body_set_t), intent(in) :: bodies
+    type(boundary_t), intent(in) :: boundaries(:)
     !> (2, contacts)
     integer(i8), intent(out) :: key(:, :)
     integer :: c, p
 
-    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
-      do c = 1, sub%n_contacts
-        p = sub%source(c)
-        key(1, c) = view%bodies%id(view%list%candidate(p))
-        if (view%list%antagonist(p) > 0) then
-          key(2, c) = view%bodies%id(view%list%antagonist(p))
-        else
-          key(2, c) = simulation%decomposition%boundaries(-view%list%antagonist(p))%id
-        end if
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      p = sub%source(c)
+      key(1, c) = bodies%id(list%candidate(p))
+      if (list%antagonist(p) > 0) then
+        key(2, c) = bodies%id(list%antagonist(p))
+      else
+        key(2, c) = boundaries(-list%antagonist(p))%id
+      end if
+    end do
   end subroutine take_keys
 
   !> A field of the contacts of a subdomain of this rank.
-  subroutine take_field(simulation, s, name, values)
-    type(simulation_t), intent(in) :: simulation
-    integer, intent(in) :: s
+  subroutine take_field(kernels, sub, view, h, name, values)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> what this subdomain sees
+    type(local_bodies_t), intent(in) :: view
+    !> step [s]
+    real(dp), intent(in) :: h
     character(len=*), intent(in) :: name
     !> (components, contacts)
     real(dp), intent(out) :: values(:, :)
     integer :: c, nd, nf
 
-    associate (sub => simulation%problem%sub(s), kernels => simulation%problem%kernels, h => simulation%physics%h)
-      nd = kernels%nd
-      nf = kernels%nf
-      select case (name)
-      case ("normal")
-        do c = 1, sub%n_contacts
-          values(:, c) = sub%hot(lane_of(c), 1:nd, block_of(c))
-        end do
-      case ("gap")
-        values(1, :) = sub%gap
-      case ("impulse")
-        do c = 1, sub%n_contacts
-          values(1, c) = sub%normal_impulse(c)
-          ! without friction there is none along the tangents
-          values(2:nf, c) = sub%impulse(lane_of(c), 2:nf, block_of(c))
-          values(nf + 1:, c) = 0.0_dp
-        end do
-      case ("moment")
-        call take_moments(sub, nd, kernels%rolling_row, kernels%nc, values)
-      case ("normal_force")
-        do c = 1, sub%n_contacts
-          values(1, c) = sub%normal_impulse(c)/h
-        end do
-      case ("tangential_force")
-        do c = 1, sub%n_contacts
-          values(1, c) = tangential_impulse(sub, nf, c)/h
-        end do
-      case ("point")
-        call take_places(simulation, s, values)
-      case ("elongation")
-        do c = 1, sub%n_contacts
-          call find_elongation(simulation%halo%view(s)%list, sub, c, values(:, c))
-        end do
-      case ("points")
-        if (kernels%has_shapes()) then
-          call take_ways(simulation, s, values)
-        else
-          call take_points(simulation, s, values)
-        end if
-      end select
-    end associate
+    nd = kernels%nd
+    nf = kernels%nf
+    select case (name)
+    case ("normal")
+      do c = 1, sub%n_contacts
+        values(:, c) = sub%hot(lane_of(c), 1:nd, block_of(c))
+      end do
+    case ("gap")
+      values(1, :) = sub%gap
+    case ("impulse")
+      do c = 1, sub%n_contacts
+        values(1, c) = sub%normal_impulse(c)
+        ! without friction there is none along the tangents
+        values(2:nf, c) = sub%impulse(lane_of(c), 2:nf, block_of(c))
+        values(nf + 1:, c) = 0.0_dp
+      end do
+    case ("moment")
+      call take_moments(sub, nd, kernels%rolling_row, kernels%nc, values)
+    case ("normal_force")
+      do c = 1, sub%n_contacts
+        values(1, c) = sub%normal_impulse(c)/h
+      end do
+    case ("tangential_force")
+      do c = 1, sub%n_contacts
+        values(1, c) = tangential_impulse(sub, nf, c)/h
+      end do
+    case ("point")
+      call take_places(kernels, sub, view, values)
+    case ("elongation")
+      do c = 1, sub%n_contacts
+        call find_elongation(view%list, sub, c, values(:, c))
+      end do
+    case ("points")
+      if (kernels%has_shapes()) then
+        call take_ways(kernels, sub, view%list, view%bodies, values)
+      else
+        call take_points(nd, sub, view%list, view%bodies, values)
+      end if
+    end select
   end subroutine take_field
 
   !> Moments of the contacts of a subdomain about n[, t, s].
@@ -215,85 +226,84 @@ contains
   end function tangential_impulse
 
   !> Ends of the contacts of a subdomain of this rank; in 2D in the plane z = 0.
-  subroutine take_points(simulation, s, point)
-    type(simulation_t), intent(in) :: simulation
-    integer, intent(in) :: s
+  subroutine take_points(nd, sub, list, bodies, point)
+    integer, intent(in) :: nd
+    type(subproblem_t), intent(in) :: sub
+    !> its pairs, and the bodies that they name
+    type(neighbour_list_t), intent(in) :: list
+    type(body_set_t), intent(in) :: bodies
     !> (6, contacts)
     real(dp), intent(out) :: point(:, :)
     real(dp) :: reach
-    integer :: c, p, nd
+    integer :: c, p
 
-    nd = simulation%problem%nd
     point(:, :) = 0.0_dp
-    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
-      do c = 1, sub%n_contacts
-        p = sub%source(c)
-        associate (candidate => view%list%candidate(p), antagonist => view%list%antagonist(p))
-          point(1:nd, c) = view%bodies%position(:, candidate)
-          reach = view%bodies%radius(candidate) + sub%gap(c)
-          if (antagonist > 0) reach = reach + view%bodies%radius(antagonist)
-        end associate
-        point(4:3 + nd, c) = point(1:nd, c) - reach*sub%hot(lane_of(c), 1:nd, block_of(c))
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      p = sub%source(c)
+      associate (candidate => list%candidate(p), antagonist => list%antagonist(p))
+        point(1:nd, c) = bodies%position(:, candidate)
+        reach = bodies%radius(candidate) + sub%gap(c)
+        if (antagonist > 0) reach = reach + bodies%radius(antagonist)
+      end associate
+      point(4:3 + nd, c) = point(1:nd, c) - reach*sub%hot(lane_of(c), 1:nd, block_of(c))
+    end do
   end subroutine take_points
 
   !> Where the bodies of the contacts of a subdomain of this rank touch.
-  subroutine take_places(simulation, s, place)
-    type(simulation_t), intent(in) :: simulation
-    integer, intent(in) :: s
+  subroutine take_places(kernels, sub, view, place)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> what this subdomain sees
+    type(local_bodies_t), intent(in) :: view
     !> (nd, contacts)
     real(dp), intent(out) :: place(:, :)
     integer :: c
 
-    associate (problem => simulation%problem)
-      do c = 1, problem%sub(s)%n_contacts
-        call find_contact_place(problem%kernels, simulation%halo%view(s), problem%sub(s), c, place(:, c))
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      call find_contact_place(kernels, view, sub, c, place(:, c))
+    end do
   end subroutine take_places
 
   !> The same ends as of take_points, of bodies with shapes: from the centre of the candidate to that of the antagonist, whose ways
   !> to the contact are their arms, or to the contact with a boundary.
-  subroutine take_ways(simulation, s, point)
-    type(simulation_t), intent(in) :: simulation
-    integer, intent(in) :: s
+  subroutine take_ways(kernels, sub, list, bodies, point)
+    type(kernels_t), intent(in) :: kernels
+    type(subproblem_t), intent(in) :: sub
+    !> its pairs, and the bodies that they name
+    type(neighbour_list_t), intent(in) :: list
+    type(body_set_t), intent(in) :: bodies
     !> (6, contacts)
     real(dp), intent(out) :: point(:, :)
-    real(dp) :: arm_i(simulation%problem%nd), arm_j(simulation%problem%nd)
+    real(dp) :: arm_i(kernels%nd), arm_j(kernels%nd)
     integer :: c, nd
 
-    nd = simulation%problem%nd
+    nd = kernels%nd
     point(:, :) = 0.0_dp
-    associate (sub => simulation%problem%sub(s), view => simulation%halo%view(s))
-      do c = 1, sub%n_contacts
-        call contact_arms(simulation%problem%kernels, sub%hot, c, arm_i, arm_j)
-        point(1:nd, c) = view%bodies%position(:, view%list%candidate(sub%source(c)))
-        point(4:3 + nd, c) = point(1:nd, c) + arm_i - arm_j
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      call contact_arms(kernels, sub%hot, c, arm_i, arm_j)
+      point(1:nd, c) = bodies%position(:, list%candidate(sub%source(c)))
+      point(4:3 + nd, c) = point(1:nd, c) + arm_i - arm_j
+    end do
   end subroutine take_ways
 
   !> How the contacts of a subdomain carry: idle, sticking or sliding.
-  subroutine take_status(simulation, sub, status)
-    type(simulation_t), intent(in) :: simulation
+  subroutine take_status(kernels, sub, status)
+    type(kernels_t), intent(in) :: kernels
     type(subproblem_t), intent(in) :: sub
     !> (contacts)
     integer(i8), intent(out) :: status(:)
     real(dp) :: held, bound
     integer :: c
 
-    associate (kernels => simulation%problem%kernels)
-      do c = 1, sub%n_contacts
-        held = sub%impulse(lane_of(c), 1, block_of(c))
-        status(c) = idle
-        if (.not. held > 0.0_dp) cycle
-        status(c) = sliding
-        if (kernels%nf == 1) cycle
-        bound = (1.0_dp - unused)*sub%hot(lane_of(c), kernels%friction_row, block_of(c))*held
-        if (tangential_impulse(sub, kernels%nf, c) < bound) status(c) = sticking
-      end do
-    end associate
+    do c = 1, sub%n_contacts
+      held = sub%impulse(lane_of(c), 1, block_of(c))
+      status(c) = idle
+      if (.not. held > 0.0_dp) cycle
+      status(c) = sliding
+      if (kernels%nf == 1) cycle
+      bound = (1.0_dp - unused)*sub%hot(lane_of(c), kernels%friction_row, block_of(c))*held
+      if (tangential_impulse(sub, kernels%nf, c) < bound) status(c) = sticking
+    end do
   end subroutine take_status
 
 end module gravier_contact_collector
