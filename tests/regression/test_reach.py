@@ -13,7 +13,7 @@ from pathlib import Path
 
 SOURCE = os.environ.get("GRAVIER_SOURCE_DIR", os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")))
 #: what is left: loops over pairs, contacts and bodies that read arrays in place, what laws of the scene have in common, and the period
-MOST = 182
+MOST = 181
 #: an index or arguments, with three levels of parentheses
 INDEX = r"(?:\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))"
 CHAIN = re.compile(rf"(?<![\w%])(\w+){INDEX}?((?:\s*%\s*\w+{INDEX}?)+)")
