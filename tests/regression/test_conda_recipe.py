@@ -46,7 +46,7 @@ class Recipe(RunTestCase):
             return subprocess.run([PYTHON, "-c", RENDER], input=recipe, capture_output=True, text=True, check=False)
         done = render(text)
         self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertIn("package='gravier', version='0.1.0'", done.stdout)
+        self.assertIn("package='gravier', version='" + re.search(r'^  version: "([\d.]+)"', text, re.M)[1], done.stdout)
         for right, wrong in (("  host:\n", "  hosts:\n"), (">=3.20", ">>3.20"), ("compiler('c')", "kompiler('c')"), ("license: BSD-3-Clause", "license: BSD 3")):
             self.assertIn(right, text)
             self.assertNotEqual(render(text.replace(right, wrong)).returncode, 0, wrong)

@@ -402,6 +402,9 @@ class ClosingTable(unittest.TestCase):
         for quick in (False, True):
             self.breaks(lambda given, quick=quick: study_loop.accepted(given, quick), good, {"ratio": 1.05, "differ": 1, "error": 0.05})
         self.assertEqual(judged(study_loop.accepted, {**good, "error": 0.02, "ratio": 1.0}, False)[0], 1)
+        # what the forms tell at their largest errors
+        for quick, error, ratio in ((False, 0.01, 1.041), (True, 0.04, 1.101)):
+            self.assertEqual(judged(study_loop.accepted, {**good, "error": error, "ratio": ratio}, quick)[0], 1)
         # starts and other work of a pair cancel: steps of 2 and 3 s after starts of 10 and 20 s, on a machine that is slower by factors
         slower = np.array([1.0, 1.5, 0.7, 2.0])[:, None]
         seconds = [slower * (np.array([10.0, 20.0]) + number * np.array([2.0, 3.0])) for number in (10, 50)]
