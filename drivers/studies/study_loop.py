@@ -6,7 +6,7 @@
 10 000 spheres on a lattice fall into a box, once in the program and once in a loop that asks `goes_on` and calls `step`, in turn, so that
 both meet the same other work of the machine. Runs of N and of a fifth as many steps tell the processor time of a step from that of the
 start, in which Python imports its modules. The results of both, on one and on two ranks, have to be the same bits; on two ranks the loop
-needs mpi4py. Leaves DIR/loop.csv and the runs. --quick makes fewer pairs of shorter runs, in a minute. Exit status: 0 a step of the loop
+needs mpi4py. Leaves DIR/loop.csv and the runs, in some ten minutes. --quick makes fewer pairs of shorter runs, in a minute. Exit status: 0 a step of the loop
 costs at most 1.02 of one of the program, but for two standard errors of the median of the ratios, and these errors are at most 0.01, with
 --quick 0.04; 1 otherwise. The full form therefore tells a step that is 4 % dearer, and the quick one a step that is 10 % dearer."""
 import os
